@@ -7,8 +7,7 @@ use std::any::Any;
 
 use crate::Error;
 
-/// Declares a [`Both`] of the two versions of a function: a `static`, which compiles them in this crate. Unit tests call neither, so there
-/// it is a constant, which compiles nothing.
+/// Declares a [`Both`] of the two versions of a function: a `static`, which compiles them in this crate; in unit tests a constant.
 #[macro_export]
 macro_rules! both {
     ($name:ident: $type:ident = $function:ident) => {

@@ -5,8 +5,7 @@
 
 #![allow(unsafe_code)]
 
-/// A loop to be compiled for several instruction sets. Implementations, and everything they call in the hot path, are
-/// `#[inline(always)]`: only inlined code gets the instruction set.
+/// A loop for several instruction sets. Implementations, and all that they call in the hot path, are `#[inline(always)]`.
 pub trait Kernel {
     /// What the loop returns.
     type Output;
@@ -34,8 +33,7 @@ fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
 
-/// Prefetches `row[at]`, where the machine has an instruction for that. So the records of the next slot are loaded while the current slot
-/// is solved. It changes no result.
+/// Prefetches `row[at]`, where the machine has an instruction for that. It changes no result.
 #[inline(always)]
 pub(crate) fn prefetch<T>(rows: &[T], at: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -113,8 +111,7 @@ fn raise_portable(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
     }
 }
 
-/// The version of [`raise_to_products`] for AVX2. Rows are arrays, not pointers, whose loads a build with debug assertions would check
-/// one by one, at three times the cost.
+/// The version for AVX2. Rows are arrays: a build with debug assertions would check loads through pointers one by one.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {

@@ -178,8 +178,7 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
     solved(a, &linked.collect::<Vec<_>>(), usual, RowOrder::DescriptorRows)
 }
 
-/// Recovers the points of `a` from records alone: of two lines that meet within rounding, one belongs to the other. The order of the
-/// two points of a paired line stays unknown.
+/// Recovers the points of `a` from records alone: of two lines that meet within rounding, one belongs to the other.
 ///
 /// # Errors
 /// When a release has planes, which meet all records, both have swapped coordinates, which all agree in one coordinate with others,

@@ -91,8 +91,7 @@ pub(super) fn solve(
     places
 }
 
-/// Returns the largest difference of coordinates that agree: the smallest one of most records is rounding or noise. It is zero if both
-/// releases have the same frame.
+/// Returns the largest difference of coordinates that agree; the smallest one of most records is rounding or noise.
 fn same(a: &[[f64; 3]], b: &[[f64; 3]], records: &[(usize, usize)]) -> f64 {
     let least = |&(own, other): &(usize, usize)| {
         (0..3).map(|c| (a[own][c] - b[other][c]).abs()).fold(f64::INFINITY, f64::min)

@@ -32,8 +32,7 @@ impl<'a> Spread<'a> {
     pub(super) fn new(feasible: &'a Feasible, grid: Grid<3>) -> Self {
         let spans: Vec<Range<i32>> =
             feasible.lines.par_iter().map(|line| grid.span(line)).collect();
-        let mut offsets = vec![0];
-        let mut n_samples = 0;
+        let (mut offsets, mut n_samples) = (vec![0], 0);
         for spans in spans.chunks(feasible.per_record) {
             n_samples += spans.iter().map(|span| span.len()).sum::<usize>();
             offsets.push(n_samples);
@@ -53,30 +52,25 @@ impl<'a> Spread<'a> {
         &self.weights[self.offsets[record]..self.offsets[record + 1]]
     }
 
-    /// Computes the likelihood of each sample of `record` at the density of other records' points, up to a common factor, into `out`. For
-    /// two points it is the likelihood of one of them.
+    /// Computes into `out` the likelihood of each sample of `record`, for one of its points, at the density of other records' points.
     pub(super) fn view(&self, record: usize, own: &[f32], out: &mut Vec<f32>) {
         let per_record = self.feasible.per_record;
+        let subtracts = self.others.is_empty();
         out.clear();
         for at in record * per_record..(record + 1) * per_record {
             let (line, span) = (&self.feasible.lines[at], self.spans[at].clone());
-            let begin = out.len();
-            let subtracts = self.others.is_empty();
             let grid = self.others.get(line.group as usize).unwrap_or(&self.grid);
             let prior = self.feasible.prior.get(at).copied().unwrap_or(1.0);
-            let own = &own[begin..begin + span.len()];
+            let own = &own[out.len()..out.len() + span.len()];
             let kernel = self_kernel(line);
-            for (at, k) in span.enumerate() {
-                let Some(voxel) = grid.voxel(line, k) else {
-                    out.push(0.0);
-                    continue;
-                };
+            out.extend(span.enumerate().map(|(at, k)| {
+                let Some(voxel) = grid.voxel(line, k) else { return 0.0 };
                 let all = grid.values[voxel];
                 let mine = if subtracts { convolve(own, at, &kernel) } else { 0.0 };
                 let others = (all - mine).max(all * LEAST_OTHERS) * prior;
                 let t = grid.parameter(k);
-                out.push(if line.is_ray() { others * t * t } else { others });
-            }
+                if line.is_ray() { others * t * t } else { others }
+            }));
         }
     }
 
@@ -101,8 +95,7 @@ impl<'a> Spread<'a> {
         self.weights = weights;
     }
 
-    /// Turns the likelihood of one point into that of one of two: a pair at distance `d` has `d^2` times the probability to be paired along
-    /// this line.
+    /// Turns the likelihood of one point into that of one of two: a pair at distance `d` is `d^2` times as probable.
     fn pair_up(&self, record: usize, view: &mut [f32]) {
         let first = self.spans[record].start;
         // Relative to the middle of the span, to avoid a difference of large squares.
@@ -135,8 +128,7 @@ impl<'a> Spread<'a> {
         self.grid.smooth(1);
     }
 
-    /// Sums the weights of the lines that `admit` accepts, per voxel. Sums are of integers, so they depend neither on threads nor on the
-    /// order of records.
+    /// Sums the weights of the lines that `admit` accepts, per voxel. Sums of integers depend neither on threads nor on order.
     fn deposit(&self, admit: impl Fn(&LineRow<3>) -> bool + Sync) -> Vec<f32> {
         let (grid, per_record) = (&self.grid, self.feasible.per_record);
         let sums: Vec<AtomicU32> = grid.values.iter().map(|_| AtomicU32::new(0)).collect();
@@ -146,8 +138,10 @@ impl<'a> Spread<'a> {
                 let line = &self.feasible.lines[at];
                 for (k, weight) in self.spans[at].clone().zip(weights.by_ref()) {
                     let quantum = (weight * QUANTA + 0.5) as u32;
-                    let voxel = grid.voxel(line, k).filter(|_| quantum > 0 && admit(line));
-                    if let Some(voxel) = voxel {
+                    if let Some(voxel) = grid.voxel(line, k)
+                        && quantum > 0
+                        && admit(line)
+                    {
                         let add = |sum: u32| Some(sum.saturating_add(quantum));
                         let _ = sums[voxel].fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
                     }

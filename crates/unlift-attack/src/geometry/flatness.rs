@@ -9,9 +9,8 @@ const KEPT: f64 = 0.9;
 /// Largest number of steps that search the thinnest direction among the kept points.
 const STEPS: usize = 8;
 
-/// Returns the smallest extent of `points` divided by the largest one: 0 on a plane or a line, near 1 in a ball; 0 for fewer than two
-/// places. Extents are those of the middle 90 % along the principal axes of the 90 % nearest to the best plane, so that outliers do
-/// not count (least trimmed squares by concentration steps: Rousseeuw and Van Driessen 1999).
+/// Returns the smallest extent of `points` divided by the largest one: 0 on a plane or a line, near 1 in a ball. Extents are those of the
+/// middle 90 % of the points nearest to the best plane (least trimmed squares by concentration steps: Rousseeuw and Van Driessen 1999).
 pub fn flatness<const D: usize>(points: &[[f64; D]]) -> f64 {
     let mut kept: Vec<[f64; D]> = points.to_vec();
     let mut flattest = 1.0;

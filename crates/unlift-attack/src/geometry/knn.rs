@@ -48,8 +48,7 @@ impl<const D: usize> Bounds<D> {
         points.fold(Self::EMPTY, |all, p| all.and(&Self { low: p, high: p }))
     }
 
-    /// Returns a lower bound, rounding included, of the squared distance from `query` to any point inside: every operation is that of the
-    /// distance itself, and each rounds monotonically.
+    /// Returns a lower bound, rounding included, of the squared distance from `query` to any point inside: each operation is monotonic.
     #[inline(always)]
     fn squared_distance(&self, query: &[f64; D]) -> f64 {
         let mut sum = 0.0;
@@ -96,8 +95,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         Ok(Self { points, depth, boxes, columns, rows, places })
     }
 
-    /// Returns all rows in patches of near ones: the box is split along its longest side until a patch holds at most `most` rows (but a
-    /// leaf is never split).
+    /// Returns all rows in patches of near ones: the box is split along its longest side down to leaves or at most `most` rows.
     pub fn patches(&self, most: usize) -> Vec<&[u32]> {
         let n = self.rows.len();
         let fits = |level: &u32| n.div_ceil(1 << level) <= most.max(1);
@@ -116,8 +114,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.search(position, None, k, found);
     }
 
-    /// Returns `of(row, its k(row) nearest other rows)` for every row, in the order of rows. The nearest are (squared distance, row),
-    /// nearest first.
+    /// Returns `of(row, its k(row) nearest other rows)` for every row. The nearest are (squared distance, row), nearest first.
     pub fn per_row<T: Send>(
         &self,
         k: impl Fn(usize) -> usize + Sync,
@@ -193,8 +190,8 @@ impl<'a, const D: usize> Knn<'a, D> {
         node - (1 << self.depth)
     }
 
-    /// Calls `take` with the places of every leaf within the squared distance `bound`, except those below node `but`; of coinciding points,
-    /// with at least the `most` that have the lowest rows.
+    /// Calls `take` with the places of every leaf within the squared distance `bound`, except below node `but`; see
+    /// [`lowest`](Self::lowest).
     #[inline(always)]
     fn leaves_within(
         &self,
@@ -231,8 +228,8 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.boxes[node].low == self.boxes[node].high
     }
 
-    /// Returns the places of a node. If its points coincide, returns only the leaves that hold the `most` lowest rows, because at equal
-    /// distances no others can be among the nearest.
+    /// Returns the places of a node; of coinciding points only the leaves with the `most` lowest rows, as no others can be among the
+    /// nearest.
     #[inline(always)]
     fn lowest(&self, node: usize, most: usize) -> std::ops::Range<usize> {
         let all = self.range(node);
@@ -267,8 +264,7 @@ fn canonical(&(squared, row): &(f64, u32)) -> u128 {
     (u128::from(squared.to_bits()) << 32) | u128::from(row)
 }
 
-/// Sorts `items`, the leaves from `first` on, into leaf order: splits along the longest side, `depth` times. `starts` returns the
-/// first place of a leaf.
+/// Sorts `items`, the leaves from `first` on, into leaf order. `starts` returns the first place of a leaf.
 fn split<const D: usize>(
     items: &mut [([f64; D], u32)],
     depth: u32,

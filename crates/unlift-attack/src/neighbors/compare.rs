@@ -48,8 +48,7 @@ pub trait Likeness: Sync {
 }
 
 /// Returns the `n_best` best partners of every row among the rows of other records. The search is exact up to `exact` rows, and reads the
-/// scores of pairs that `kept` has. With more rows, similar rows are first made adjacent, and each block is compared with the blocks that
-/// have the most similar means. Mean and deviation of scores are computed if `counts`.
+/// scores that `kept` has. Of more rows, similar blocks are compared. Mean and deviation of scores are computed if `counts`.
 ///
 /// # Errors
 /// When there are more rows than `exact`, and the means of all blocks are equal.
@@ -377,8 +376,7 @@ pub struct Found {
     pub deviation: f64,
 }
 
-/// Keeps the entries with the highest scores, and among equal scores those with the lowest ids. The result depends on the set
-/// of entries alone.
+/// Keeps the entries with the highest scores, and among equal scores those with the lowest ids, in whatever order they come.
 #[derive(Clone, Debug)]
 pub struct Best {
     n_best: usize,

@@ -17,10 +17,8 @@ const MOST: usize = 1 << 13;
 /// deviations above the mean, averaged over both rows. Mean and deviation are those of a row's best scores over all reaches. Scores are
 /// symmetric; 0 between a descriptor and itself.
 ///
-/// The largest of a pair's [`REACHES`] scores is the one that [`Overlap`](super::Overlap) starts its walk from; which one is the
-/// largest depends on the distance of the patches. Deviations are those among the given descriptors. For a part of a larger
-/// set, `usual` gives the mean and deviation of each descriptor's scores with all of the larger set ([`usual`](usual())),
-/// because within a part of similar descriptors scores are higher.
+/// For a part of a larger set, `usual` gives the mean and deviation of each descriptor's scores with all of the larger set
+/// ([`usual`](usual())), because within a part of similar descriptors scores are higher.
 ///
 /// # Errors
 /// When there are fewer than two descriptors or more than 8,192, or `usual` has another number of entries.

@@ -3,8 +3,7 @@
 use crate::released::Released;
 use crate::{About, Error, RecordId, RowOrder};
 
-/// Per slot, the records that are said to hide its neighbors. They ascend by record id, because an order by distance would reveal more
-/// than a set. The source and the fraction of true neighbors are not stored, as the attacker does not have them. The
+/// Per slot, the records that are said to hide its neighbors, by record id, because an order by distance would reveal more than a set. The
 /// released map and the order of rows are stored, because positions made from lists are meaningless without them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Neighborhoods {
@@ -15,8 +14,7 @@ pub struct Neighborhoods {
 }
 
 impl Neighborhoods {
-    /// Creates lists for all slots of a map with `n_records` records. Slot `s` has `records[offsets[s]..offsets[s + 1]]`, which is
-    /// sorted here, with optional `scores`.
+    /// Creates lists for all slots of a map with `n_records` records. Slot `s` has `records[offsets[s]..offsets[s + 1]]`, in any order.
     ///
     /// # Errors
     /// When the offsets do not partition `records`, a record is out of range, twice in a list or the slot's own, a score is

@@ -34,8 +34,7 @@ pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
     slots
 }
 
-/// Descriptor rows sorted by content. So sums and ties do not depend on the order of the released map: permuting its records permutes
-/// its lists, except for equal rows.
+/// Descriptor rows sorted by content: permuting the records of a released map permutes its lists, except for equal rows.
 #[derive(Debug)]
 pub struct Rows<'a> {
     /// All descriptors, by slot, as they are compared.

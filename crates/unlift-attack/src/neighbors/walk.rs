@@ -66,8 +66,7 @@ pub fn standardized(found: &[Found]) -> Vec<Ranked> {
     (0..found.len()).into_par_iter().map(row).collect()
 }
 
-/// Ranks at most `n_best` rows that a walk from each row reaches, followed by the other rows in `ranked` (standardized scores or log
-/// probabilities, best first). Scores are natural logarithms.
+/// Ranks at most `n_best` rows that a walk from each row reaches, then the others of `ranked`. Scores are natural logarithms.
 pub fn walk(ranked: &[Ranked], record_of: &[u32], n_best: usize, how: Walk) -> Vec<Ranked> {
     let steps = graph(ranked);
     let scratch = || Scratch { at: vec![0.0; ranked.len()], sum: vec![0.0; ranked.len()] };
@@ -139,8 +138,7 @@ struct Scratch {
 }
 
 impl Scratch {
-    /// Returns the rows that a walk from `start` reaches, ascending, with the discounted sum of the probabilities to be there after
-    /// 1, 2, ... steps.
+    /// Returns the rows that a walk from `start` reaches, ascending, with the discounted sum of their probabilities after each step.
     fn reached(&mut self, steps: &[Vec<(u32, f64)>], start: usize, how: Walk) -> Vec<(u32, f64)> {
         let mut here = vec![(start as u32, 1.0)];
         let (mut touched, mut ever) = (Vec::new(), Vec::new());

@@ -1,6 +1,6 @@
 //! The attacks of this crate, from released records and lists to recovered points: the steps in their order.
 
-use crate::density::tomography;
+use crate::density::{Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::baselines::density::published;
 use crate::recover::baselines::ransac::{self, Trials};
@@ -13,8 +13,7 @@ use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, join
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
 
-/// Number of joint recoveries from known positions, each after the known ones are put back. With eight instead of three, `dcl2d` on
-/// RedKitchen gains less than a point.
+/// Number of joint recoveries from known positions. With eight, `dcl2d` on RedKitchen gains less than a point.
 const ROUNDS: usize = 3;
 
 /// Least mean evidence, in nats, of estimates on rays whose centers have regions: below it they are hardly better than chance.
@@ -71,12 +70,10 @@ fn solve<const D: usize>(
     Attack::new(released, lists, options, solver).run()
 }
 
-/// Runs our attacks on the records alone; returns the name and the result of each. They recover nothing from a map of planes, or
-/// of rays from one center.
+/// Runs our attacks on the records alone; returns the name and result of each. Planes and rays from one center yield nothing.
 ///
-/// They read the whole map: a sample of its records is a sparser map, of which less is recovered, so that the baseline would be too low.
-/// The published density attack runs on rays only: on lines it recovered less than tomography on every map and at every
-/// threshold (docs/benchmarks.md), and took four times as long.
+/// They read the whole map, because of a sample less is recovered. The published attack runs on rays only: on lines it recovered less than
+/// tomography on every map (docs/benchmarks.md).
 ///
 /// # Errors
 /// When `options` are out of range.
@@ -90,12 +87,10 @@ pub fn records_alone<const D: usize>(
     let none = none.with_about(About { order: RowOrder::Either, ..About::default() });
     let mut attacks = Vec::new();
     if matches!(released.obfuscation(), Obfuscation::Rays(_)) {
-        attacks.push((
-            Builtin::Density.name(),
-            peaks::at_peaks(released, &none, &published(released))?,
-        ));
+        let peaks = published(released).unwrap_or_default();
+        attacks.push((Builtin::Density.name(), peaks::at_peaks(released, &none, &peaks)?));
     }
-    let peaks = tomography(released);
+    let peaks = tomography(released).unwrap_or_default();
     attacks.push((Builtin::Tomography.name(), peaks::at_peaks(released, &none, &peaks)?));
     // Planes and rays from one center have no geometric lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
@@ -156,9 +151,11 @@ impl<'a, const D: usize> Attack<'a, D> {
 
     fn run(&self) -> Result<Recovered<D>, Error> {
         let Self { released, lists, .. } = *self;
+        let at =
+            |peaks: Option<Peaks>| peaks::at_peaks(released, lists, &peaks.unwrap_or_default());
         match (self.solver, released.obfuscation()) {
-            (Builtin::Density, _) => peaks::at_peaks(released, lists, &published(released)),
-            (Builtin::Tomography, _) => peaks::at_peaks(released, lists, &tomography(released)),
+            (Builtin::Density, _) => at(published(released)),
+            (Builtin::Tomography, _) => at(tomography(released)),
             (_, Obfuscation::Lines(_) | Obfuscation::Rays(_)) => {
                 self.run_on(&LineFamily::new(released, lists))
             }
@@ -216,8 +213,7 @@ impl<'a, const D: usize> Attack<'a, D> {
     }
 }
 
-/// Returns the estimates of all slots after the steps of joint recovery from `start`. Estimates that are `known`, per slot, stay as they
-/// are.
+/// Returns the estimates of all slots after the steps of joint recovery from `start`. Those that are `known` stay as they are.
 fn joint<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
@@ -245,8 +241,7 @@ fn joint<const D: usize, F: Family<D>>(
     if let Some(rays) = family.anchored().filter(|_| known.is_empty()) {
         estimates = anchors::layout::recover(rays, (lists, &graph.listers), estimates);
     }
-    // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Points of
-    // paired lines would lose by beliefs.
+    // The likeliest places under whole lists, or under their entries where the rest says too little. Paired lines would lose by beliefs.
     let with_beliefs = graph.slots_per_record == 1 && lists.scores().is_some();
     restore(match ranking::recover(problem, &estimates) {
         Some(ranked) => ranked,

@@ -1,8 +1,7 @@
 //! Confidence: the probability that an estimate is right, without ground truth.
 //!
-//! Around a right estimate, many of the records that the slot lists are near, and many of those that list the slot. Around a wrong one,
-//! fewer are, by chance or because estimates drifted together. A logistic model turns their numbers into a probability, and two of them
-//! into the scale of the error. Its constants were fitted on synthetic rooms, a cube, clusters and an outdoor scene, never on a real map
+//! Around a right estimate, many of the records that the slot lists are near, and many of those that list the slot. A logistic model turns
+//! their numbers into a probability, and two of them into the scale of the error. Its constants were fitted on synthetic maps only
 //! (docs/decisions/attack.md).
 
 use rayon::prelude::*;
@@ -35,8 +34,7 @@ const FOUND: [f32; 5] = [2.494, 0.308, -0.608, -1.07, 1.33];
 /// Weights in the logarithm of the scale, of the logarithms of: all near records; the share of near entries of near slots.
 const SCALE: [f32; 2] = [-0.133, -0.675];
 
-/// Predicts the confidence of every slot that joint recovery, whose graph is `graph`, placed.
-/// Fails where the model was never fitted or tested.
+/// Predicts the confidence of every slot that joint recovery placed. Fails where the model was never fitted or tested.
 pub(super) fn predict<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,

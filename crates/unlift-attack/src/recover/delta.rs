@@ -1,9 +1,8 @@
 //! The automatic choice of delta: the length at which consensus agrees least probably by chance.
 //!
-//! Consensus solves a sample of slots for a geometric ladder of deltas that starts at the extent of the records. At a small delta
-//! chance agreement is rare but true neighbors are lost; at a large one everything agrees. The score of a delta is the mean evidence
-//! minus the mean evidence of the same slots with mixed lists, made of entries of other slots' lists. Both means contain the
-//! effects of the number of places tried and of uneven density.
+//! Consensus solves a sample of slots for a geometric ladder of deltas. The score of a delta is the mean evidence minus that of the same
+//! slots with mixed lists, made of entries of other slots' lists: both contain the effects of the number of places tried and of uneven
+//! density.
 
 use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
@@ -12,9 +11,8 @@ use crate::recover::map::{CHUNK, Family, mixed, trimmed_box};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
-/// Least delta within known bounds, as a fraction of the spacing of points. A fifth of the keypoints of an image coincide with
-/// another, and coordinates may be integers: such records agree exactly, so that the evidence of a few slots keeps growing as
-/// delta shrinks.
+/// Least delta within known bounds, as a fraction of the spacing of points. A fifth of the keypoints of an image coincide with another:
+/// such records agree exactly, so that evidence grows as delta shrinks.
 const LEAST_DELTA: f64 = 0.25;
 /// The bounds along an axis are ignored if they are this many times as long as the range of most points.
 const TOO_LARGE: f64 = 1.5;
@@ -22,8 +20,7 @@ const TOO_LARGE: f64 = 1.5;
 const ANCHOR_DELTA: f64 = 1.75;
 /// Halvings of the extent in the coarse ladder: down to 1 / 16,384 of it.
 const HALVINGS: u32 = 14;
-/// Halvings in the coarse ladder below the first delta that is not too wide: a center far from all points makes the extent of
-/// rays arbitrarily large.
+/// Halvings in the coarse ladder below the first delta that is not too wide: a far center makes the extent of rays arbitrarily large.
 const HALVINGS_NOT_TOO_WIDE: u32 = 5;
 /// Steps per octave of the fine ladder. The maximum is flat, so finer steps do not help.
 const FINE: i32 = 3;
@@ -43,8 +40,8 @@ const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 /// agree exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices the choice is arbitrary.
 const COLLAPSED: f64 = 4.0;
 
-/// Chooses delta for `released` as `family`, in the unit of the map. Consensus reads `used`: the lists as `given`, or those of
-/// both directions. With `sharp`, it chooses a narrow delta, for joint recovery.
+/// Chooses delta, in the unit of the map. Consensus reads `used`: lists as `given`, or those of both directions. `sharp` is for joint
+/// recovery.
 pub(super) fn learn<const D: usize, F: Family<D>>(
     released: &Released<D>,
     family: &F,
@@ -94,9 +91,9 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     libm::pow(volume / released.n_slots().max(1) as f64, 1.0 / D as f64)
 }
 
-/// Returns the delta with the best score, at least `least`; `None` for an empty map or one without extent. A list holds the
-/// fraction `share` of all records. The maximum is a plateau. By default the widest delta of it is taken, whose larger support is
-/// more stable; with `beyond_edge`, a narrow one, at most that many times its lower edge, because joint recovery sharpens it.
+/// Returns the delta with the best score, at least `least`; `None` for a map without extent. A list holds the fraction `share` of all
+/// records. Of the plateau at the maximum it takes the widest delta; with `beyond_edge`, a narrow one, at most that many times its lower
+/// edge.
 fn choose<const D: usize, F: Family<D>>(
     family: &F,
     (lists, slots_per_record): (&Neighborhoods, usize),
@@ -164,11 +161,9 @@ fn choose<const D: usize, F: Family<D>>(
     })
 }
 
-/// Returns the lower edge of the plateau: where evidence begins to fall as delta shrinks below `coarse`, the best of the coarse
-/// ladder.
+/// Returns the lower edge of the plateau: where evidence begins to fall as delta shrinks below `coarse`, the best of its ladder.
 ///
-/// Wrong entries of the same region keep evidence large up to deltas many times the distance of true neighbors. They raise the
-/// upper part of the plateau, but not its lower edge.
+/// Wrong entries of the same region raise the upper part of the plateau, but not its lower edge.
 fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
     let at = |step: i32| coarse * libm::exp2(f64::from(-step) / f64::from(FINE));
     let mut values: Vec<f64> = (-FINE..=0).map(|step| value(at(step))).collect();

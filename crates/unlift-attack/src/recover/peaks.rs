@@ -21,7 +21,7 @@ pub(super) fn at_peaks<const D: usize>(
     let rows = rows_of(released, None);
     // Delta is the resolution of the peaks.
     let delta = if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 };
-    let peak = |slot: usize| match peaks.of[slot] {
+    let peak = |slot: usize| match peaks.of.get(slot).copied().flatten() {
         // These attacks return positions in three dimensions only.
         Some(Estimate { position, axis, evidence, .. }) => {
             Estimate::at(std::array::from_fn(|c| position[c % 3]), 0, axis.into(), evidence)
@@ -29,11 +29,8 @@ pub(super) fn at_peaks<const D: usize>(
         None => Estimate::lost(Status::NoSupport),
     };
     let distances = |slot: usize, x: [f32; D]| {
-        let rows = &rows;
-        lists.of(slot).iter().map(move |record| {
-            let row = &rows[record.index()];
-            row.distance2(&x, row.along(&x)).sqrt()
-        })
+        let rows = lists.of(slot).iter().map(|record| &rows[record.index()]);
+        rows.map(move |row| row.distance2(&x, row.along(&x)).sqrt())
     };
     let cost = |at: usize, slot: usize| distances(slot, peak(at).position).sum::<f32>();
     let place = |slot: usize| {

@@ -210,8 +210,7 @@ impl<const D: usize> Recovered<D> {
         })
     }
 
-    /// Creates the result of your own solver: `positions` relative to the released origin, one per slot. A position that is not
-    /// finite marks a slot that was not recovered.
+    /// Creates the result of your own solver from one position per slot, relative to the released origin. One that is not finite is lost.
     ///
     /// For axis candidates, the hidden axis is the one along which the position is farthest from the published one.
     ///
@@ -376,8 +375,7 @@ impl<const D: usize> Recovered<D> {
     }
 }
 
-/// Per slot, the released descriptor row that belongs to it (supplement B); `None` unless records have two slots and
-/// descriptors.
+/// Per slot, the released descriptor row that belongs to it (supplement B); `None` unless paired lines have descriptors.
 ///
 /// The cheaper of the two assignments wins. The cost of a descriptor and a list is the sum of the distances from the descriptor to
 /// the listed records, each taken to the nearer of the record's two descriptors.

@@ -74,8 +74,7 @@ impl<const D: usize> Obfuscation<D> {
         }
     }
 
-    /// Whether the records are bearings from one center. All meet there, so neighbors say nothing about ranges, but whoever stands in
-    /// the center sees the scene.
+    /// Whether the records are bearings from one center: lists say nothing about ranges, but who stands there sees the scene.
     pub fn is_bearings(&self) -> bool {
         self.rays().is_some_and(|rays| rays.centers.len() == 1)
     }
@@ -281,12 +280,10 @@ fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
     order.iter().map(|&row| column[row as usize]).collect()
 }
 
-/// Stored directions whose squared length differs from 1 by less than this stay unchanged, so that normalizing twice changes no bit. The
-/// `f32` rounding of a unit vector stays below it.
+/// Stored directions whose squared length differs from 1 by less stay unchanged, so that normalizing twice changes no bit.
 const UNIT_SLACK: f64 = 6e-7;
 
-/// Whether `v` may come from a stored file. Only then may a normal form keep it; otherwise its last bits would show a length near 1 or
-/// a point near the foot.
+/// Whether `v` may come from a stored file. Otherwise its last bits would show a length near 1 or a point near the foot.
 fn is_f32<const D: usize>(v: &[f64; D]) -> bool {
     v.iter().all(|&x| f64::from(x as f32) == x)
 }

@@ -186,9 +186,8 @@ const SURE: f32 = 0.9;
 /// Lists alone are right if they place a keypoint this near to a sure position, in pixels.
 const NEAR_PX: f64 = 10.0;
 
-/// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found, and `alone`
-/// those that lists alone give. Known positions that are more likely right than wrong, and that are more likely right than those of
-/// lists alone or near them, stay as they are until exact constraints apply. The result has no confidence.
+/// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found, and `alone` those
+/// that lists alone give. Known positions stay if they are likelier right than those of lists alone, or near them. There is no confidence.
 ///
 /// # Errors
 /// When the lists do not have one row per slot, or the arguments are of different queries.
@@ -250,8 +249,7 @@ pub struct Links {
 }
 
 impl Links {
-    /// Links mutual nearest neighbors of the descriptors of any two queries that are fewer than `reach` apart and look in similar
-    /// directions.
+    /// Links mutual nearest neighbors of the descriptors of queries fewer than `reach` apart that look in similar directions.
     ///
     /// # Errors
     /// When a query has no descriptors, or two have descriptors of different length.
@@ -296,8 +294,7 @@ impl Links {
         links
     }
 
-    /// Returns these links for other releases of the same keypoints. `of_slots` has, per query, the slot of each new slot in the
-    /// release of these links.
+    /// Returns these links for other releases of the same keypoints. `of_slots` has, per query, the old slot of each new slot.
     ///
     /// # Panics
     /// When a slot is out of range or a slot has no new one.

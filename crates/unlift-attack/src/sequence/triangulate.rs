@@ -71,8 +71,7 @@ pub struct Fit {
     pub n_agree: usize,
     /// Root mean square distance of its projections from the lines of these views, in pixels.
     pub residual_px: f64,
-    /// Condition: standard deviation of `place` along its line, in pixels, if all lines are off by one pixel. Large where planes are
-    /// nearly parallel, infinite where they do not fix a point.
+    /// Standard deviation of `place` along its line, in pixels, if all lines are off by one pixel; infinite where planes fix no point.
     pub condition: f64,
     /// Lead over the best solution at another place, as a difference of squared residuals in units of the noise. Infinite without one.
     pub lead: f64,
@@ -89,9 +88,8 @@ pub(super) const MISS: f64 = 3.0;
 /// Two solutions are at different places if they are farther apart in the first view than this, in units of the noise.
 const APART: f64 = 5.0;
 
-/// Finds the point that most of `sights` agree on; the first must be among them. `noise_px` is the usual distance of a keypoint from the
-/// projection of its point. Returns `None` if there are fewer than three records, or if no point is in front of the cameras and inside of
-/// the images.
+/// Finds the point that most of `sights` agree on, the first among them; `noise_px` is their usual error. Returns `None` with fewer than
+/// three records, or if no point is in front of the cameras and inside of the images.
 pub fn triangulate(sights: &[Sight], noise_px: f64) -> Option<Fit> {
     let (first, others) = sights.split_first()?;
     // Pairs of other views in the order of their sum, so that early ones are used evenly.

@@ -48,8 +48,7 @@ pub struct Pair {
     pub still: usize,
     /// Length of the shift in cells, `|dx| + |dy|`.
     pub shift: usize,
-    /// Whether exchanging the patches gives other hypotheses. Odd turns resample the cells of the turned patch. Even turns
-    /// come in pairs of a turn and its inverse.
+    /// Whether exchanging the patches gives other hypotheses: odd turns resample the cells, even ones come with their inverse.
     pub both_ways: bool,
 }
 
@@ -123,8 +122,7 @@ impl Hypotheses {
 /// Exponent of the fraction of cells that are compared.
 const WEIGHT_EXPONENT: f64 = 0.06;
 
-/// Returns the content of `cell` after the patch is turned by `turn` times 45 degrees about its middle and then shifted; `None` if
-/// it is outside the patch.
+/// Returns the content of `cell` after a turn by `turn` times 45 degrees about the middle and a shift; `None` outside the patch.
 fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<[(u8, f32); 4]> {
     let middle = (SIDE - 1) as f64 / 2.0;
     let x = (cell % SIDE) as f64 - middle - f64::from(shift[0]);

@@ -27,8 +27,7 @@ pub const WALK: Walk = Walk { steps: 5, decay: 0.7 };
 /// Lists the records whose patches overlap each slot's patch most, or that a short walk over such records reaches. The score is
 /// the logarithm of the discounted probability to be reached.
 ///
-/// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, each block of descriptors is compared with the blocks
-/// that have the most similar means, which misses some partners.
+/// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, similar blocks of descriptors are compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Overlap;
 
@@ -75,8 +74,7 @@ impl<const D: usize> Source<D> for Overlap {
     }
 }
 
-/// Length of a version as a vector of bytes. Rounding adds less than half of the square root of [`DIM`], so that a product of two is
-/// at most 133 x 133.
+/// Length of a version as a vector of bytes. With rounding, a product of two is at most 133 x 133.
 const LENGTH: f32 = 127.0;
 
 /// Least norm of shared cells. With a smaller one, blank parts (at the border of an image) would match each other.

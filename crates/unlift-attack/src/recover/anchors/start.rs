@@ -1,10 +1,8 @@
 //! The start: ranges from the spread of bearings.
 //!
-//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions, so crossings give no position.
-//! Perspective gives a range: from the anchor, neighbors within a distance `s` of a point at range `r` are seen within an
-//! angle of `s / r`. The angle is that of the window of bearings whose listed rays are least probable by chance. The
-//! distance `s` is unknown, but among rays of similar bearing those with narrow windows are likely long. Points are assumed to
-//! be uniform over the region, so that the rank of a window gives a range.
+//! Rays of one anchor meet only there, and rays of two anchors not at all, so crossings give no position. Perspective gives a range:
+//! neighbors within a distance `s` of a point at range `r` are seen within an angle of `s / r`, that of the least probable window of
+//! bearings. `s` is unknown, but among rays of similar bearing those with narrow windows are likely long: ranks give ranges.
 
 use rayon::prelude::*;
 

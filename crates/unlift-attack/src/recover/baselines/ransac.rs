@@ -1,9 +1,8 @@
 //! The sampling loop of the paper (section 4), for comparison.
 //!
-//! Each trial draws a few listed records and computes their least-squares position, Eq. (4). The position with the largest support
-//! is refined by least squares over the supporting records. The number of trials follows the largest support so far (draws
-//! without replacement, 99 % confidence) and is at most 10,000. The paper does not give the sample size: here it is two records per
-//! unknown coordinate (for planes, one may be drawn twice).
+//! Each trial draws a few listed records and computes their least-squares position, Eq. (4). That with the largest support is refined. The
+//! number of trials follows the largest support so far (draws without replacement, 99 % confidence). The paper does not give the sample
+//! size: here it is two records per unknown coordinate.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -95,8 +94,7 @@ impl<const D: usize, F: Family<D> + Trials<D>> Step for Sampling<'_, D, F> {
     }
 }
 
-/// Draws samples of `size` of `n` records until one without outliers was likely drawn. Returns that with the largest support and its support,
-/// if any has support, and the number of trials.
+/// Draws samples until one without outliers was likely drawn; returns the one with most support, if any, and the number of trials.
 #[inline(always)]
 fn best_sample<T>(
     (n, size): (u32, u32),
@@ -117,8 +115,7 @@ fn best_sample<T>(
     (best, trials)
 }
 
-/// Returns the number of trials after which a sample of `size` inliers, of `inliers` among `n`, was drawn with probability
-/// [`CONFIDENCE`].
+/// Returns the number of trials that draw a sample of `size` inliers, of `inliers` among `n`, with probability [`CONFIDENCE`].
 #[inline(always)]
 fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     let mut all_inliers = 1.0;
@@ -132,8 +129,7 @@ fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     (trials.ceil() as u32).clamp(1, MAX_TRIALS)
 }
 
-/// Returns the parameter along the line of the gathered sections, refined by least squares. `may_vote` is the number of listed records that
-/// may vote.
+/// Returns the parameter along the line of the gathered sections, refined by least squares. `may_vote` listed records may vote.
 #[inline(always)]
 fn on_line<const D: usize>(
     Task { delta, mut draws, .. }: Task<'_>,
@@ -255,9 +251,8 @@ impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
 
 /// Returns the exchanged axis of every record, by majority vote over all neighborhoods that contain it.
 ///
-/// In a neighborhood (a slot's record and its listed records), each member votes for the axis with the largest sum of distances
-/// to the others. The paper does not define "relatively larger". Here sums are divided by their mean over the neighborhood;
-/// otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
+/// In a neighborhood (a slot's record and its list), each member votes for the axis with the largest sum of distances to the others. Sums
+/// are divided by their mean: otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
 fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
     let votes: Vec<[AtomicU32; D]> =
         rows.iter().map(|_| std::array::from_fn(|_| AtomicU32::new(0))).collect();

@@ -1,8 +1,7 @@
 //! Beliefs: a few places per slot, each with the probability that it is the right one.
 //!
-//! Lists that a source makes from descriptors are unlike those of the oracle. Few entries are right, entries with better scores are right
-//! more often, and entries are wrong together, because records with similar descriptors list the same records. So the lists of a slot often
-//! support several places. This step starts from the estimates of joint recovery. In an iteration it
+//! Lists that a source makes from descriptors are wrong together, because records with similar descriptors list the same records. So the
+//! lists of a slot often support several places. This step starts from the estimates of joint recovery. In an iteration it
 //!
 //! 1. learns, for each class `c` of edges, the likelihood ratio `L_c(u)` of an edge between points at distance `u` against one between
 //!    points that are far apart (`tables`). The unit of `u` is a *width*, about the distance to the 50th nearest estimate
@@ -13,9 +12,9 @@
 //!    in images without the density;
 //! 4. refines the best place, and keeps the best ones with weights proportional to `exp(score)`.
 //!
-//! The density counts the places of other slots within a width: points lie on surfaces. Places of the own slot do not count, because they
-//! would confirm themselves. The volume element is `range^2` for rays, which diverge; for axis candidates, it is the density of the values
-//! published on the axis that was exchanged. The first iteration moves all slots, the others one of two random halves in turn.
+//! The density counts the places of other slots within a width. The volume element is `range^2` for rays, which diverge; for axis
+//! candidates, it is the density of the values published on the axis that was exchanged. The first iteration moves all slots, the others
+//! one of two random halves in turn.
 //!
 //! The method is belief propagation with particles on the graph of lists, as in the localization of sensor networks (Ihler et al. 2005),
 //! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/tried.md.
@@ -58,8 +57,7 @@ const CANDIDATES: usize = 40;
 const OF_EDGES: f32 = 0.67;
 /// An edge proposes a candidate if the squared distance of its place to the record is below this, in squared widths.
 const NEAR2: f32 = 2.0;
-/// Number of random places that are tried for candidates that no edge proposes, and their largest squared distance to the record, in images
-/// and in maps.
+/// Number of random places that are tried without an edge, and their largest squared distance to the record, in images and in maps.
 const PROPOSALS: usize = 300;
 const PROPOSAL_NEAR2: [f32; 2] = [0.3, 1.0];
 /// Candidates are at least this far apart, in widths; kept places are farther apart than [`MERGED`] typical widths.
@@ -75,8 +73,7 @@ const AGREED: f32 = 0.3;
 /// Places with less weight are dropped.
 const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Returns the estimates of all slots after beliefs from `start`, those of joint recovery. Without enough slots, they stay. Records have one
-/// slot each.
+/// Returns the estimates of all slots, one per record, after beliefs from `start`. Without enough slots, they stay.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
@@ -86,12 +83,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         return estimates;
     }
     let marginals = marginals(problem.family, start.len());
-    let belief = |(weight, estimate): (f32, &Estimate<D>)| match estimate.is_known() {
-        true => vec![Place { x: estimate.position, piece: estimate.axis, weight }],
-        false => Vec::new(),
-    };
-    let mut beliefs: Vec<Vec<Place<D>>> =
-        start_weights(&start).into_iter().zip(&start).map(belief).collect();
+    let mut beliefs = first_beliefs(&start);
     let (mut typical, mut tables) = (None, None);
     for iteration in 0..ITERATIONS {
         let Some(places) = Places::new(&beliefs, &estimates, &mut typical) else {
@@ -109,11 +101,11 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             crowd: Crowd::new(&places, &tree),
             marginals: &marginals,
         };
-        let moves = |&slot: &usize| {
+        let mut slots = along_curve(&estimates);
+        slots.retain(|&slot| {
             let mut draws = Draws::new(problem.seed, Stage::Beliefs, slot as u64);
             iteration == 0 || draws.below(2) as usize == iteration % 2
-        };
-        let slots: Vec<usize> = along_curve(&estimates).into_iter().filter(moves).collect();
+        });
         let updated = solve_slots(&context, &slots);
         for (slot, belief) in slots.into_iter().zip(updated) {
             if let Some(belief) = belief {
@@ -153,15 +145,17 @@ fn short_edges<const D: usize, F: Family<D>>(
     short as f32 / all.max(1) as f32
 }
 
-/// Returns the weight of each estimate of joint recovery, by the rank of its evidence.
-fn start_weights<const D: usize>(estimates: &[Estimate<D>]) -> Vec<f32> {
+/// Returns the estimates of joint recovery as beliefs, weighted by the rank of their evidence.
+fn first_beliefs<const D: usize>(estimates: &[Estimate<D>]) -> Vec<Vec<Place<D>>> {
     let mut order: Vec<usize> = (0..estimates.len()).collect();
     order.sort_by(|&a, &b| estimates[a].evidence.total_cmp(&estimates[b].evidence));
-    let mut weights = vec![0.0; estimates.len()];
-    for (rank, slot) in order.into_iter().enumerate() {
-        weights[slot] = START_WEIGHT.0 + START_WEIGHT.1 * rank as f32 / estimates.len() as f32;
+    let mut beliefs = vec![Vec::new(); estimates.len()];
+    for (rank, slot) in order.into_iter().enumerate().filter(|&(_, s)| estimates[s].is_known()) {
+        let Estimate { position: x, axis: piece, .. } = estimates[slot];
+        let weight = START_WEIGHT.0 + START_WEIGHT.1 * rank as f32 / estimates.len() as f32;
+        beliefs[slot].push(Place { x, piece, weight });
     }
-    weights
+    beliefs
 }
 
 /// A possible place of a slot, on a piece of its feasible set, and the probability that it is the right one.
@@ -186,8 +180,7 @@ struct Places<const D: usize> {
 }
 
 impl<const D: usize> Places<D> {
-    /// Measures the width at every place; `estimates` are the best places. The first call sets the `typical` width. Returns `None` if no
-    /// slot has a place, or most places coincide.
+    /// Measures the width at every place; `estimates` are the best ones. The first call sets `typical`. `None` if most places coincide.
     fn new(
         beliefs: &[Vec<Place<D>>],
         estimates: &[Estimate<D>],
@@ -236,23 +229,19 @@ impl<const D: usize> Places<D> {
 
 /// Returns places that are likely right, in random order: what slots are near that no edge names.
 fn proposals<const D: usize>(places: &Places<D>, seed: u64) -> Vec<[f32; D]> {
-    let best: Vec<(usize, &Place<D>)> = (0..places.n_slots())
-        .filter_map(|slot| Some((slot, places.all[places.of(slot)].first()?)))
-        .collect();
+    let best = |slot: usize| Some((slot, places.all[places.of(slot)].first()?));
+    let mut best: Vec<(usize, &Place<D>)> = (0..places.n_slots()).filter_map(best).collect();
     let mut weights: Vec<f32> = best.iter().map(|(_, place)| place.weight).collect();
     let low = 3 * weights.len() / 10;
     let least = *weights.select_nth_unstable_by(low, f32::total_cmp).1;
-    let mut likely: Vec<(u64, [f32; D])> = best
-        .into_iter()
-        .filter(|(_, place)| place.weight >= least)
-        .map(|(slot, p)| (Draws::new(seed, Stage::BeliefProposals, slot as u64).bits(), p.x))
-        .collect();
-    likely.sort_unstable_by_key(|entry| entry.0);
-    likely.into_iter().map(|(_, x)| x).collect()
+    best.retain(|(_, place)| place.weight >= least);
+    best.sort_by_cached_key(|&(slot, _)| {
+        Draws::new(seed, Stage::BeliefProposals, slot as u64).bits()
+    });
+    best.into_iter().map(|(_, place)| place.x).collect()
 }
 
-/// The volume element of axis candidates: per piece and slot, the logarithm of the density of the values on the exchanged axis. Empty for
-/// families whose feasible sets have one piece.
+/// The volume element of axis candidates: per piece and slot, the logarithm of the density of values on the axis. Else empty.
 fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>> {
     if F::PIECES == 1 {
         return Vec::new();
@@ -273,8 +262,7 @@ fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>
     (0..F::PIECES).map(of_axis).collect()
 }
 
-/// All places in the order of the leaves of a search tree, in columns, so that the places of a leaf take a few vector instructions.
-/// Columns have a leaf more than there are places.
+/// All places in the order of the leaves of a search tree, in columns, padded by a leaf, so that loops run over vectors.
 struct Crowd<'a, const D: usize> {
     tree: &'a Knn<'a, D>,
     x: [Vec<f32>; D],
@@ -547,9 +535,10 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             if weight < LEAST_WEIGHT && !kept.is_empty() {
                 break;
             }
-            let is_near = |place: &Place<D>| distance2(&place.x, &candidate.x) < merged * merged;
-            if let Some(near) = kept.iter().position(is_near) {
-                kept[near].weight += weight;
+            let is_near =
+                |place: &&mut Place<D>| distance2(&place.x, &candidate.x) < merged * merged;
+            if let Some(near) = kept.iter_mut().find(is_near) {
+                near.weight += weight;
             } else if kept.len() < PLACES {
                 kept.push(Place { x: candidate.x, piece: candidate.piece as u8, weight });
             }

@@ -39,11 +39,9 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
     tables: &Tables,
 ) -> f32 {
     let sample: Vec<usize> = evenly(places.n_slots(), 2000).collect();
-    let named: Vec<Vec<Named<D>>> = sample
-        .par_iter()
-        .map(|&slot| named(problem, places, tables, slot))
-        .filter(|named| named.len() > 1)
-        .collect();
+    let of_slot = |slot: usize| named(problem, places, tables, slot);
+    let mut named: Vec<Vec<Named<D>>> = sample.into_par_iter().map(of_slot).collect();
+    named.retain(|named| named.len() > 1);
     let fit = |temper: f32| -> f64 {
         let of_slot = |named: &Vec<Named<D>>| {
             let most = named.iter().map(|n| n.evidence).fold(f32::NEG_INFINITY, f32::max);
@@ -71,32 +69,31 @@ fn named<const D: usize, F: Family<D>>(
     slot: usize,
 ) -> Vec<Named<D>> {
     let edges = || problem.graph.of(slot).enumerate();
-    let best_at = |end: usize| {
-        places.of(end).max_by(|&a, &b| places.all[a].weight.total_cmp(&places.all[b].weight))
+    let best_at = |(edge, (end, _)): (usize, (usize, u8))| {
+        let best = places.all[places.of(end)].iter().max_by(|a, b| a.weight.total_cmp(&b.weight));
+        Some((edge, best?.x))
     };
     let width = places.typical;
     let passes = |slot: usize, x: &[f32; D]| problem.family.is_near(slot, x, width * width);
     let mut draws = Draws::new(problem.seed, Stage::BeliefTables, !(slot as u64));
     let others: Vec<usize> =
         (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
-    let mut all: Vec<Named<D>> = edges()
-        .filter_map(|(edge, (end, _))| Some((edge, places.all[best_at(end)?].x)))
-        .take(MAX_PLACES)
-        .map(|(edge, x)| {
-            let mut evidence = 0.0;
-            for (_, (end, class)) in edges().filter(|&(at, _)| at != edge) {
-                let mut ratio = 1.0;
-                for at in places.of(end) {
-                    ratio += places.all[at].weight * tables.at(class, places.distance(&x, at));
-                }
-                evidence += ln(ratio.max(1e-6));
+    let named = |(edge, x): (usize, [f32; D])| {
+        let mut evidence = 0.0;
+        for (_, (end, class)) in edges().filter(|&(at, _)| at != edge) {
+            let mut ratio = 1.0;
+            for at in places.of(end) {
+                ratio += places.all[at].weight * tables.at(class, places.distance(&x, at));
             }
-            let by_chance = others.iter().filter(|&&other| passes(other, &x)).count();
-            let chance = (by_chance as f64 + 0.5) / (BY_CHANCE + 1) as f64;
-            let ratio = if passes(slot, &x) { 1.0 / chance } else { 0.0 };
-            Named { x, evidence, ratio }
-        })
-        .collect();
+            evidence += ln(ratio.max(1e-6));
+        }
+        let by_chance = others.iter().filter(|&&other| passes(other, &x)).count();
+        let chance = (by_chance as f64 + 0.5) / (BY_CHANCE + 1) as f64;
+        let ratio = if passes(slot, &x) { 1.0 / chance } else { 0.0 };
+        Named { x, evidence, ratio }
+    };
+    let all = edges().filter_map(best_at).take(MAX_PLACES).map(named);
+    let mut all: Vec<Named<D>> = all.collect();
     all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     let mut kept: Vec<Named<D>> = Vec::new();
     let apart = SEPARATE * width;

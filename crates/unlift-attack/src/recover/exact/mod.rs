@@ -1,9 +1,8 @@
 //! Exact constraints on exchanged coordinates: each of two records publishes the hidden coordinate of the other.
 //!
-//! A pair of partners must explain two estimates: each estimate lies near the value that the other record published. The
-//! distribution of these distances is learned together with the probabilities of pairs (expectation maximization), per class of
-//! evidence. Every record is in at most one pair, so the probabilities come from belief propagation on the
-//! monomer-dimer model, with one pass per round. No pair is fixed before the last round, so rivals keep their probability.
+//! A pair of partners must explain two estimates: each lies near the value that the other record published. The distribution of these
+//! distances is learned together with the probabilities of pairs (expectation maximization). Every record is in at most one pair, so these
+//! come from belief propagation on the monomer-dimer model, with one pass per round.
 
 mod partners;
 
@@ -26,8 +25,7 @@ const FRACTION: (f64, f64) = (0.02, 0.995);
 /// Bins of distances from 0 to the reach: as fine as the narrowest distribution.
 const STEPS: usize = 1 << 9;
 
-/// Replaces the hidden coordinate of estimates of axis candidates by the exact value where the partner is known. Estimates on records of
-/// other families stay as they are.
+/// Replaces the hidden coordinate of estimates of axis candidates by the exact value where the partner is known.
 pub(crate) fn settle<const D: usize>(
     released: &Released<D>,
     mut estimates: Vec<Estimate<D>>,
@@ -133,8 +131,7 @@ fn pairs<const D: usize>(
     of_record
 }
 
-/// Returns the next messages of all pairs. `weight` is that of each pair (equal in both directions), `alone` that of a record
-/// without a partner.
+/// Returns the next messages of all pairs, from the weight of each pair (equal in both directions) and of a record `alone`.
 fn next_messages(
     messages: &[f32],
     partners: &Partners,
@@ -158,8 +155,7 @@ fn probability(messages: &[f32], partners: &Partners, weight: &[f32], e: usize) 
     odds / (1.0 + odds)
 }
 
-/// Returns, per record, the inverse density of published values around its estimate: where values are rare, a value nearby is
-/// strong evidence.
+/// Returns, per record, the inverse density of published values around its estimate: a rare value nearby is strong evidence.
 fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) -> Vec<f64> {
     let half = 0.5 * reach;
     let sorted: [Vec<f32>; D] = std::array::from_fn(|axis| {
@@ -186,8 +182,7 @@ fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
     estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence)).collect()
 }
 
-/// The distribution of distances between estimates and hidden coordinates: per class, the fraction of good estimates and a
-/// mixture of normal distributions.
+/// The distribution of distances between estimates and hidden coordinates, per class: a mixture of normal distributions.
 struct Distances {
     good: [f64; CLASSES],
     weight: [[f64; SCALES]; CLASSES],

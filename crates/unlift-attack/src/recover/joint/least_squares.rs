@@ -77,8 +77,7 @@ impl<const D: usize> Sums<D> {
 impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     /// Moves `x` along `own` by weighted least squares; returns the place and the number of records within reach.
     ///
-    /// The residual of a neighbor is the difference to its estimate: with full weight across its own record, with less weight
-    /// along it. `directions` is a buffer for unit directions (for planes: normals).
+    /// The residual of a neighbor is the difference to its estimate, with less weight along its own record. `directions` is a buffer.
     #[inline(always)]
     pub(super) fn least_squares(
         &self,

@@ -10,8 +10,7 @@ use crate::recover::result::Estimate;
 
 /// Estimates farther from a piece than this many radii are ignored.
 pub(super) const TUBE: f32 = 6.0;
-/// Estimates within this many radii of the center of a ray are ignored: they are close to all rays of that center, so that a few
-/// wrong ones would draw many slots there.
+/// Estimates within this many radii of the center of a ray are ignored: they are close to all its rays, so that a few draw many slots.
 const CENTER_RADIUS: f32 = 3.0;
 /// Candidates per piece are chosen so that about this many are estimates of true neighbors.
 const TRUE_CANDIDATES: f32 = 5.0;

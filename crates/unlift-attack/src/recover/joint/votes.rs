@@ -65,8 +65,7 @@ impl<const D: usize> Ends<D> {
         self.slot.len()
     }
 
-    /// Copies the estimates within `reach` of `piece` to `near`, with their odds, except those within `center_radius` of the
-    /// center of a ray.
+    /// Copies the estimates within `reach` of `piece` to `near`, except those within `center_radius` of the center of a ray.
     #[inline(always)]
     pub(super) fn near(
         &mut self,
@@ -194,8 +193,7 @@ impl<const D: usize> Near<D> {
         sums.iter().sum()
     }
 
-    /// Returns the log-likelihood ratio with a bound: the sums of forward and of reverse edges differ by at most `most_imbalance`
-    /// plus the sum of mutual edges; the rest is cut off.
+    /// Returns the log-likelihood ratio without that by which forward and reverse edges differ by more than the bound plus mutual ones.
     #[inline(always)]
     pub(super) fn balanced_log_likelihood(
         &self,

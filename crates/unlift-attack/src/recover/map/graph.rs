@@ -1,8 +1,7 @@
 //! The neighborhood graph: which slots list which records, in both directions.
 //!
-//! A slot has edges to the records that it lists, and to the slots that list its record: both are likely neighbors. Edges fall in
-//! classes by direction (one end lists the other, or both do) and by the score of the source. Edges of one class share
-//! an inlier ratio, which recovery learns.
+//! A slot has edges to the records that it lists, and to the slots that list its record. Edges fall in classes by direction (one end lists
+//! the other, or both do) and by score. Edges of one class share an inlier ratio, which recovery learns.
 
 use std::ops::Range;
 
@@ -27,8 +26,7 @@ const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.95
 /// Number of scores from which these quantiles are computed.
 const SCORES: usize = 1 << 16;
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
-/// Largest number of reverse edges of a slot, as a multiple of the mean list length: a record in very many lists is in most of
-/// them by mistake.
+/// Largest number of reverse edges of a slot, in mean list lengths: a record in very many lists is in most of them by mistake.
 const MOST_REVERSE: usize = 3;
 /// Slots per parallel task.
 const PART: usize = 1 << 12;
@@ -174,8 +172,7 @@ impl Graph {
         edges.map(|(&end, &class)| (end as usize, class))
     }
 
-    /// Whether an edge of this class leads to a record without saying which of its two slots: lists have records as entries, while
-    /// the slot that owns a list is known.
+    /// Whether an edge of this class leads to a record without saying which of its two slots: entries of lists are records.
     #[inline(always)]
     pub(crate) fn is_either(&self, class: u8) -> bool {
         self.slots_per_record == 2 && side(class) != Side::Reverse

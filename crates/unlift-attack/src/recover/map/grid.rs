@@ -84,8 +84,7 @@ impl<const D: usize> Grid<D> {
         let mut number = 0;
         for c in 0..D {
             let at = ((x(c) - self.low[c]) * self.per_length - 0.5).max(0.0).min(self.last[c]);
-            // Adding a large number rounds to an integer: a cast that handles infinities is no vector instruction. A place exactly between
-            // two cells may get either.
+            // Adding a large number rounds to an integer; a cast that handles infinities is no vector instruction.
             let whole = (at + ROUNDING).to_bits() - ROUNDING.to_bits();
             number = number * self.dims[c] as u32 + whole;
         }
@@ -240,9 +239,8 @@ impl<const D: usize> Density<D> {
         self.grid.at(x)
     }
 
-    /// Returns the local stretch: how many times larger the distance to neighbors is than at a typical place. Lists are equally long
-    /// everywhere, so neighbors lie farther away where the density is low. Dense places get 1, because the grid does not resolve them.
-    /// The cube root is right in three dimensions; two dimensions use it, too.
+    /// Returns the local stretch: how many times larger the distance to neighbors is than at a typical place, because the density is lower.
+    /// Dense places get 1. The cube root is right in three dimensions; two dimensions use it, too.
     #[inline(always)]
     pub(crate) fn stretch(&self, density: f32) -> f32 {
         let ratio = self.typical / density;
@@ -250,8 +248,7 @@ impl<const D: usize> Density<D> {
     }
 }
 
-/// In cells of `grid` with less than `enough`, replaces the value by that of the narrowest wider smoothing with as many estimates
-/// in its neighborhood.
+/// In cells of `grid` with less than `enough`, replaces the value by that of the narrowest wider smoothing that has enough.
 fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
     let mut wide = grid.clone();
     let mut open: Vec<u32> =
@@ -266,8 +263,7 @@ fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
     }
 }
 
-/// Edge of a cell in radii. Linear distribution, smoothing and lookup by cell together have the variance of the kernel
-/// `1 - r^2 / radius^2` in three dimensions.
+/// Edge of a cell in radii: distribution, smoothing and lookup have the variance of the kernel `1 - r^2 / radius^2` in 3D.
 const CELL: f32 = 0.436;
 
 /// Returns the cube root of a number above 1, to 1e-3: two Newton steps from an exponent divided by three.
