@@ -113,14 +113,12 @@ impl Descriptors {
         }
     }
 
-    /// Returns row `at`.
     pub(crate) fn row(&self, at: usize) -> Vec<f32> {
         let mut row = vec![0.0; self.dim];
         self.read_row(at, &mut row);
         row
     }
 
-    /// Returns all rows.
     pub(crate) fn rows(&self) -> impl Iterator<Item = Vec<f32>> {
         (0..self.len()).map(|at| self.row(at))
     }

@@ -89,7 +89,6 @@ pub(crate) fn packed(column: usize, at: usize, depth: usize) -> usize {
     panel + (at / QUAD) * PANEL * QUAD + (column % PANEL) * QUAD + at % QUAD
 }
 
-/// The portable version of [`raise_to_products`].
 fn raise_portable(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
     for i in 0..BLOCK {
         let row = &left[i * depth..(i + 1) * depth];

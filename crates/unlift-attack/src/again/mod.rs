@@ -40,7 +40,6 @@ struct Flats {
     per_record: usize,
     /// Axis and coordinate of each plane.
     planes: Vec<(usize, f64)>,
-    /// Points with swapped coordinates.
     swapped: Vec<[f64; 3]>,
     /// The origin of the release in this frame.
     shift: [f64; 3],
@@ -102,7 +101,6 @@ struct Place {
     miss: Option<f64>,
     /// Error of the point along its record, if the records are off by one.
     condition: f64,
-    /// Swapped axis.
     axis: u8,
     /// Whether the records leave more than one point.
     is_open: bool,
@@ -234,11 +232,8 @@ fn check(a: &Released<3>, b: &Released<3>) -> Result<(), Error> {
     }
 }
 
-/// Two linked records.
 struct Linked {
-    /// Row of the first release.
     row: usize,
-    /// Record of the second release.
     partner: u32,
     place: Place,
     /// Distance between the records in units of the usual one of wrong pairs; `None` if all such records meet.

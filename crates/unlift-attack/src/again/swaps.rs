@@ -26,7 +26,6 @@ impl Node {
         self.axes.len() == 2
     }
 
-    /// Returns the first record with its swapped coordinate replaced.
     fn point(&self, first: bool) -> ([f64; 3], usize) {
         let axis = self.axes[usize::from(!first)];
         let mut point = self.a;
@@ -40,7 +39,6 @@ struct Cycle {
     axis: usize,
     /// [`MISSING`] for a point that only one release has, which closes a chain.
     nodes: Vec<usize>,
-    /// Values of the first records.
     values: Vec<f64>,
     /// Places of the two nodes that only one release swapped along this axis.
     ends: [usize; 2],

@@ -22,7 +22,6 @@ pub(crate) enum Hides {
     OnAxis,
 }
 
-/// All records of a map.
 #[derive(Debug)]
 pub(crate) struct Feasible {
     pub(crate) hides: Hides,
@@ -68,7 +67,6 @@ impl Feasible {
         Some(Self { hides, lines, prior, per_record, n_groups })
     }
 
-    /// Number of records.
     pub(crate) fn n_records(&self) -> usize {
         self.lines.len() / self.per_record
     }
@@ -136,7 +134,6 @@ fn crossing(lines: &[LineRow<3>]) -> Option<([f64; 3], f64)> {
     sound.then(|| (middle, median(&mut distances)))
 }
 
-/// Returns the point of a line nearest to `x`.
 fn nearest(line: &LineRow<3>, x: &[f64; 3]) -> [f64; 3] {
     let (through, direction) = (widen(&line.through), widen(&line.direction));
     along(&through, dot(&sub(x, &through), &direction), &direction)

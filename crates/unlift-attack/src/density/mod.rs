@@ -13,7 +13,6 @@
 //! The cost is the number of samples of all lines times rounds. It is linear in the records, with about 1 kB per line on the finest grid.
 
 pub(crate) mod feasible;
-mod grid;
 pub(crate) mod peaks;
 mod spread;
 

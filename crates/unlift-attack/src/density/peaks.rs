@@ -73,7 +73,6 @@ pub(crate) fn maxima<T: Copy + Default + PartialOrd>(values: &[T]) -> impl Itera
     (0..values.len()).filter(is_maximum)
 }
 
-/// Likelihood around one sample.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     likelihood: f32,

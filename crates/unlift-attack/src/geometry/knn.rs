@@ -13,7 +13,6 @@ use crate::geometry::frame::Bounds;
 use crate::geometry::vector::squared_distance;
 use crate::simd::{Kernel, dispatch};
 
-/// Largest number of points per leaf.
 pub(crate) const LEAF: usize = 16;
 /// Nodes with fewer points are split without parallelism.
 const ALONE: usize = 1 << 14;
@@ -25,7 +24,6 @@ pub struct Knn<'a, const D: usize> {
     depth: u32,
     /// Boxes of the nodes: the root is 1, the halves of node `i` are `2 i` and `2 i + 1`.
     boxes: Vec<Bounds<D>>,
-    /// Coordinates in leaf order.
     columns: [Vec<f64>; D],
     /// Row at each place of the leaf order.
     rows: Vec<u32>,
@@ -222,7 +220,6 @@ impl<'a, const D: usize> Knn<'a, D> {
         }
     }
 
-    /// Whether all points of a node coincide.
     #[inline(always)]
     fn is_pile(&self, node: usize) -> bool {
         self.boxes[node].low == self.boxes[node].high
@@ -241,13 +238,11 @@ impl<'a, const D: usize> Knn<'a, D> {
         all.start..self.range((1 << self.depth) + last).end
     }
 
-    /// Returns the leaf of a place.
     #[inline(always)]
     fn leaf_of(&self, place: usize) -> usize {
         (((place + 1) << self.depth) - 1) / self.rows.len()
     }
 
-    /// Returns the places of a node.
     #[inline(always)]
     fn range(&self, node: usize) -> std::ops::Range<usize> {
         let level = usize::BITS - 1 - node.leading_zeros();

@@ -37,7 +37,6 @@ pub trait Likeness: Sync {
     const NAME: &'static str;
     /// Scores are rounded to multiples of this, so that their sums are exact in any order.
     const STEP: f32;
-    /// [`BLOCK`] rows, prepared for comparison.
     type Block: Send + Sync;
 
     /// Prepares the rows of `slots`, at most [`BLOCK`].
@@ -184,7 +183,6 @@ impl Compared {
         found.into_par_iter().enumerate().map(finish).collect()
     }
 
-    /// Returns the rows at `at`, prepared for comparison.
     fn block<L: Likeness>(&self, likeness: &L, at: impl Iterator<Item = u32>) -> L::Block {
         let slots: Vec<u32> = at.map(|at| self.slots[at as usize]).collect();
         likeness.block(&self.descriptors, &slots)
@@ -347,7 +345,6 @@ impl Row {
         self.squares += squares;
     }
 
-    /// Takes back a counted score.
     fn uncount(&mut self, score: f32, step: f32) {
         let mut one = Self::new(0);
         one.count(&[score], &[0], 1, step);
@@ -365,7 +362,6 @@ impl Row {
     }
 }
 
-/// The result of comparing a row with others.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// The best rows of other records, best first; equal scores in row order.
@@ -386,7 +382,6 @@ pub struct Best {
 }
 
 impl Best {
-    /// Keeps at most `n_best` entries.
     pub fn new(n_best: usize) -> Self {
         Self { n_best, floor: f32::NEG_INFINITY, entries: Vec::new() }
     }
@@ -433,7 +428,6 @@ const HELD: u32 = 256;
 
 /// Pairs of blocks with a range of blocks, which stay in memory meanwhile.
 struct Tile {
-    /// The blocks in memory.
     held: Range<usize>,
     /// Each block that is compared with some of them, and these.
     meetings: Vec<(u32, Vec<u32>)>,
@@ -468,7 +462,6 @@ fn chosen(alike: &[Found]) -> Vec<Tile> {
 
 // Similar blocks of a large map.
 
-/// Number of rows from which the direction is computed.
 const SAMPLE: usize = 256;
 /// Number of power iterations. An approximate direction suffices.
 const ITERATIONS: usize = 8;
@@ -526,10 +519,7 @@ fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
     direction
 }
 
-/// Returns the mean row of each block of `slots`.
-///
-/// # Errors
-/// When all of them are equal.
+/// Returns the mean row of each block of `slots`; fails if all of them are equal.
 fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Error> {
     let mean = |slots: &[u32]| {
         let mut sum = vec![0.0f32; descriptors.dim()];

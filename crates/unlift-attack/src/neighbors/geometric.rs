@@ -65,9 +65,6 @@ impl Source<3> for Geometric {
 }
 
 /// Makes the lists of [`geometric`] from given estimates of tomography.
-///
-/// # Errors
-/// When [`geometric`] fails.
 pub(crate) fn geometric_by<const D: usize>(
     released: &Released<D>,
     k: usize,
@@ -79,10 +76,10 @@ pub(crate) fn geometric_by<const D: usize>(
     let known = known.filter_map(|(slot, peak)| Some((slot, widen(&peak.as_ref()?.position))));
     let (slots, positions): (Vec<usize>, Vec<[f64; 3]>) = known.unzip();
     let mut rows: Vec<Vec<(f32, RecordId)>> = vec![Vec::new(); released.n_slots()];
-    if positions.is_empty() {
+    // There may be no positions at all.
+    let Ok(knn) = Knn::new(&positions) else {
         return Neighborhoods::scored(rows, released, RowOrder::Either);
-    }
-    let knn = Knn::new(&positions)?;
+    };
     let per_record = released.slots_per_record();
     let near = |scratch: &mut Vec<(f64, u32)>, at: usize| {
         let own = RecordId::from_index(slots[at] / per_record);
@@ -139,11 +136,9 @@ fn check<const D: usize>(released: &Released<D>, k: usize) -> Result<(), Error> 
 
 /// Returns the distance from `x` to the line of a record; 0 for axis candidates, which have three lines.
 fn distance_to<const D: usize>(released: &Released<D>, record: RecordId, x: &[f64; 3]) -> f64 {
-    let Some((through, direction)) = released.obfuscation().line(record.index()) else {
-        return 0.0;
-    };
+    let Some(line) = released.obfuscation().line(record.index()) else { return 0.0 };
     let [through, direction] =
-        [through, direction].map(|v| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) });
+        [line.0, line.1].map(|v| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) });
     let t = dot(&sub(x, &through), &direction);
     distance(x, &along(&through, t, &direction))
 }

@@ -9,7 +9,6 @@ use super::similarity::{Cosine, Units};
 use crate::Descriptors;
 use crate::simd::{self, BLOCK, Kernel};
 
-/// Columns that are compared at once.
 const LANES: usize = 16;
 /// Blocks of rows that one thread compares at once.
 const ROW_BLOCKS: usize = 8;
@@ -41,7 +40,6 @@ impl Nearest {
     }
 }
 
-/// Descriptors in blocks, ready to be compared.
 pub(crate) struct Blocks {
     blocks: Vec<Units>,
     len: usize,
@@ -129,7 +127,6 @@ impl Columns {
 /// Adds the scores of a block to its rows and columns.
 struct Keep<'a> {
     scores: &'a [f32],
-    /// First row of the block.
     at: usize,
     /// The columns of the block. The last block has places without descriptors.
     others: Range<usize>,

@@ -31,10 +31,8 @@ impl Neighborhoods {
             let expected = format!("{n_slots} slots, as the released map has");
             return Err(Error::new("neighborhoods", expected, offsets.len().saturating_sub(1)));
         }
-        if offsets[0] != 0
-            || offsets[n_slots] != records.len() as u64
-            || offsets.windows(2).any(|w| w[0] > w[1])
-        {
+        let ends = (offsets[0], offsets[n_slots]);
+        if ends != (0, records.len() as u64) || !offsets.is_sorted() {
             let expected = format!("ascending from 0 to {}", records.len());
             return Err(Error::new("neighborhood offsets", expected, "another sequence"));
         }
@@ -139,36 +137,28 @@ fn check_row(
     n_records: usize,
     slots_per_record: usize,
 ) -> Result<(), Error> {
-    let what = || format!("neighborhood of slot {slot}");
+    let wrong = |expected: String, found: String| {
+        Err(Error::new(format!("neighborhood of slot {slot}"), expected, found))
+    };
     if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
-        let found = format!("record {} twice", pair[0].0);
-        return Err(Error::new(what(), "each record once", found));
+        return wrong("each record once".into(), format!("record {} twice", pair[0].0));
     }
-    if let Some(last) = row.last()
-        && last.index() >= n_records
-    {
-        let expected = format!("records below {n_records}");
-        return Err(Error::new(what(), expected, last.0));
+    if let Some(last) = row.last().filter(|last| last.index() >= n_records) {
+        return wrong(format!("records below {n_records}"), last.0.to_string());
     }
     let own = RecordId::from_index(slot / slots_per_record);
     if row.binary_search(&own).is_ok() {
-        return Err(Error::new(what(), "other records", format!("its own record {}", own.0)));
+        return wrong("other records".into(), format!("its own record {}", own.0));
     }
     Ok(())
 }
 
-/// Sorts a list by record, together with its scores.
 fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
-    match scores {
-        None => records.sort_unstable(),
-        Some(scores) => {
-            let mut both: Vec<(RecordId, f32)> =
-                records.iter().copied().zip(scores.iter().copied()).collect();
-            both.sort_by_key(|&(record, _)| record);
-            for (at, (record, score)) in both.into_iter().enumerate() {
-                records[at] = record;
-                scores[at] = score;
-            }
-        }
+    let Some(scores) = scores else { return records.sort_unstable() };
+    let mut both: Vec<(RecordId, f32)> =
+        records.iter().copied().zip(scores.iter().copied()).collect();
+    both.sort_by_key(|&(record, _)| record);
+    for (at, both) in both.into_iter().enumerate() {
+        (records[at], scores[at]) = both;
     }
 }

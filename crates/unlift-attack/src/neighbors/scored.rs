@@ -206,7 +206,6 @@ fn both_ways(ranked: Vec<Ranked>) -> Vec<Ranked> {
     ranked.par_iter().enumerate().map(row).collect()
 }
 
-/// Number of rows of a set.
 const SIZE: usize = 1024;
 /// Number of these that are spread over the map, to give typical scores.
 const USUAL: usize = 256;
@@ -219,7 +218,6 @@ const EDGES: usize = 24;
 
 /// Rows that are scored together.
 struct Set {
-    /// The rows, ascending.
     rows: Vec<u32>,
     /// Whether each row is in the middle of the set.
     inner: Vec<bool>,

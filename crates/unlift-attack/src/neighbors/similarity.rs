@@ -83,7 +83,6 @@ impl<const D: usize> Source<D> for Similarity {
     }
 }
 
-/// Compares descriptors by their cosine.
 pub struct Cosine;
 
 /// Adjacent columns, whose sums fit in registers.

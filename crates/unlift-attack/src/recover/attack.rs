@@ -19,7 +19,6 @@ const ROUNDS: usize = 3;
 /// Least mean evidence, in nats, of estimates on rays whose centers have regions: below it they are hardly better than chance.
 const LEAST_EVIDENCE: f64 = 1.5;
 
-/// An attack by one of our solvers.
 struct Attack<'a, const D: usize> {
     released: &'a Released<D>,
     lists: &'a Neighborhoods,
@@ -200,7 +199,8 @@ impl<'a, const D: usize> Attack<'a, D> {
         } else {
             settle(start())
         };
-        let recovered = Recovered::new(released, lists, &estimates, delta)?.with_trials(trials);
+        let mut recovered = Recovered::new(released, lists, &estimates, delta)?;
+        recovered.trials = trials;
         let predicted = match &graph {
             None => Err(Unknown::OtherSolver),
             Some(_) if !self.options.confidence => Err(Unknown::NotAsked),

@@ -179,7 +179,6 @@ fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
     at(LOWEST)
 }
 
-/// Returns the slots of some chunks, in ascending order.
 fn sample(n_slots: usize, n_chunks: usize, seed: u64) -> Vec<usize> {
     let all = n_slots.div_ceil(CHUNK);
     let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);

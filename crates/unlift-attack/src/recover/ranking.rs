@@ -168,7 +168,6 @@ struct Terms<const D: usize> {
     /// Radius at the center, and the number of estimates within it.
     radius: f32,
     length: f32,
-    /// Differences of the estimates to the center.
     away: Columns<D>,
     terms: Vec<Term>,
     /// Per term, its squared distance to a place, and twice its component along a direction.
@@ -248,11 +247,9 @@ impl<const D: usize> Terms<D> {
     }
 }
 
-/// What an iteration reads.
 struct Context<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
     estimates: &'a [Estimate<D>],
-    /// The estimates of `slots`.
     tree: &'a Knn<'a, D>,
     slots: &'a [u32],
     radius: &'a [f32],

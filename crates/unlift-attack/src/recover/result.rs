@@ -54,7 +54,6 @@ pub(crate) fn stored_support(count: u32) -> u16 {
 }
 
 impl<const D: usize> Estimate<D> {
-    /// Whether the slot has a position.
     #[inline(always)]
     pub(crate) fn is_known(&self) -> bool {
         self.status == Status::Ok
@@ -165,7 +164,7 @@ pub struct Recovered<const D: usize> {
     axis: Option<Vec<u8>>,
     descriptor_row: Option<Vec<u32>>,
     confidence: Result<Vec<Confidence>, Unknown>,
-    trials: Option<Vec<(u32, u64)>>,
+    pub(super) trials: Option<Vec<(u32, u64)>>,
     about: About,
 }
 
@@ -366,12 +365,6 @@ impl<const D: usize> Recovered<D> {
     /// Histogram of trials per slot (`ransac` only; not stored in files): the largest number of trials in each bin, and the number of slots.
     pub fn trials(&self) -> Option<&[(u32, u64)]> {
         self.trials.as_deref()
-    }
-
-    /// Adds the histogram of trials.
-    #[must_use]
-    pub(crate) fn with_trials(self, trials: Option<Vec<(u32, u64)>>) -> Self {
-        Self { trials, ..self }
     }
 }
 

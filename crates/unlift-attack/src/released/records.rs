@@ -66,7 +66,6 @@ impl<const D: usize> Obfuscation<D> {
         }
     }
 
-    /// The rays, if that is the family.
     pub(crate) fn rays(&self) -> Option<&Rays<D>> {
         match self {
             Self::Rays(rays) => Some(rays),
@@ -275,7 +274,6 @@ impl<const D: usize> AxisCandidates<D> {
     }
 }
 
-/// Returns the rows `order[0], order[1], ...` of one column.
 fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
     order.iter().map(|&row| column[row as usize]).collect()
 }
@@ -289,9 +287,6 @@ fn is_f32<const D: usize>(v: &[f64; D]) -> bool {
 }
 
 /// Returns the unit vector along `v`; `v` itself if it is a stored unit vector.
-///
-/// # Errors
-/// When `v` is not finite or has no length.
 fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], Error> {
     let norm2: f64 = v.iter().map(|x| x * x).sum();
     if !norm2.is_finite() || norm2 <= 0.0 {
@@ -305,7 +300,6 @@ fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], E
     Ok(v.map(|x| x / norm))
 }
 
-/// Rounds `v` to `f32`; the error names the row.
 fn finite_f32<const D: usize>(v: [f64; D], what: &str, row: usize) -> Result<[f32; D], Error> {
     let rounded = v.map(|x| x as f32);
     if rounded.iter().all(|x| x.is_finite()) {

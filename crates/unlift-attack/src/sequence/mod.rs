@@ -41,7 +41,6 @@ impl Query {
         dot(&self.camera.pose.rotation[2], &other.camera.pose.rotation[2]) > TURNED
     }
 
-    /// Back-projects the record of `slot`.
     fn sight(&self, projection: [[f64; 4]; 3], slot: usize) -> Sight {
         let origin = self.released.origin();
         let record = slot / self.released.slots_per_record();
@@ -95,7 +94,6 @@ pub struct Solved {
 
 /// Noise with which tracks are first triangulated, in pixels. Shares depend little on it.
 const FIRST_NOISE_PX: f64 = 5.0;
-/// Least noise assumed, in pixels.
 const LEAST_NOISE_PX: f64 = 1.0;
 /// Largest noise assumed, in pixels. With more, every line would agree.
 const MOST_NOISE_PX: f64 = 12.0;

@@ -18,7 +18,6 @@ pub struct Sight {
     area: Bounds<2>,
     /// Back-projected lines, of which one contains the keypoint; the second is unused for most records.
     planes: [Plane; 2],
-    /// Unit normals of these lines in the image.
     normals: [[f64; 2]; 2],
     n_planes: usize,
 }
@@ -79,9 +78,7 @@ pub struct Fit {
 
 /// Most hypotheses of three records.
 pub(super) const MOST_HYPOTHESES: usize = 240;
-/// Hypotheses that are refined.
 const REFINED: usize = 5;
-/// Steps of refinement.
 const STEPS: usize = 8;
 /// Distance that counts as a miss, in units of the noise.
 pub(super) const MISS: f64 = 3.0;

@@ -35,7 +35,6 @@ const CLEARLY: f64 = 1.2;
 const SURE: f64 = 0.95;
 /// Two discs of radius 1 at distance `d` share about `1 - d / 1.6` of their area, up to 1.5.
 const LENGTH: f32 = 1.6;
-/// Least length of an edge in radii.
 const LEAST_LENGTH: f32 = 0.1;
 /// Number of fits of the affine map, each weighted by the ranges of the one before.
 const FITS: usize = 8;
@@ -105,7 +104,6 @@ fn agreement<const D: usize>(lists: &Neighborhoods, estimates: &[Estimate<D>]) -
 /// Edges between likely neighbors, in both directions, with their lengths in radii.
 struct Edges {
     of: Vec<Vec<(u32, f32)>>,
-    /// Fraction of listed records that are edges.
     kept: f64,
 }
 
@@ -272,7 +270,6 @@ fn affine<const D: usize>(
     Some(ranges)
 }
 
-/// Gradient ascent of the ranges of `slots`.
 struct Ascent<'a, const D: usize> {
     rows: &'a [LineRow<D>],
     lists: &'a Neighborhoods,

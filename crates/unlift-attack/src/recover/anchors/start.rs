@@ -22,7 +22,6 @@ const LEAST_SECTOR: usize = 20;
 /// A window of bearings around a slot's ray.
 #[derive(Clone, Copy, Debug)]
 struct Window {
-    /// Sine of the half angle.
     sine: f32,
     count: u32,
     evidence: f32,

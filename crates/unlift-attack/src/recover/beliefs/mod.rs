@@ -37,7 +37,6 @@ use crate::seed::{Draws, Stage};
 use tables::{BIN_ENDS, Tables};
 
 const ITERATIONS: usize = 5;
-/// Largest number of places per slot.
 const PLACES: usize = 4;
 /// A width is the distance to this neighbor, counted among all slots: in images, and in maps.
 const WIDTH_NEIGHBOR: [usize; 2] = [20, 50];
@@ -92,15 +91,16 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         let learned = Tables::learn(problem, &places, tables.as_ref());
         let points: Vec<[f64; D]> = places.all.iter().map(|place| widen(&place.x)).collect();
         let Ok(tree) = Knn::new(&points) else { return estimates };
-        let context = Context {
+        let mut context = Context {
             problem,
-            temper: temper::learn(problem, &places, &learned),
+            temper: 1.0,
             proposals: proposals(&places, problem.seed),
             places: &places,
             tables: &learned,
             crowd: Crowd::new(&places, &tree),
             marginals: &marginals,
         };
+        context.temper = context.learn_temper();
         let mut slots = along_curve(&estimates);
         slots.retain(|&slot| {
             let mut draws = Draws::new(problem.seed, Stage::Beliefs, slot as u64);
@@ -169,11 +169,8 @@ struct Place<const D: usize> {
 /// The places of all slots, the one with the best score of each slot first.
 struct Places<const D: usize> {
     all: Vec<Place<D>>,
-    /// Range of the places of each slot.
     offsets: Vec<u32>,
-    /// Slot of each place.
     slot: Vec<u32>,
-    /// Width at each place.
     width: Vec<f32>,
     /// The median width of the start, the unit of lengths that hold for the whole map.
     typical: f32,
@@ -315,20 +312,17 @@ impl<'a, const D: usize> Crowd<'a, D> {
     }
 }
 
-/// Returns a leaf's part of a column of [`Crowd`].
 #[inline(always)]
 fn leaf<T>(column: &[T], start: usize) -> &[T; LEAF] {
     column[start..].first_chunk().expect("columns are padded")
 }
 
-/// What an iteration reads.
 struct Context<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
     places: &'a Places<D>,
     tables: &'a Tables,
     temper: f32,
     proposals: Vec<[f32; D]>,
-    /// All places, for their density.
     crowd: Crowd<'a, D>,
     marginals: &'a [Vec<f32>],
 }
@@ -359,41 +353,36 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
     /// Returns the new places of `slot`, the best one first; `None` if there is no candidate.
     #[inline(always)]
     fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> Option<Vec<Place<D>>> {
-        let Scratch { near, candidates, leaves } = scratch;
-        near.resize_with(F::PIECES, Vec::new);
-        candidates.clear();
-        for (piece, near) in near.iter_mut().enumerate() {
-            self.propose(slot, piece, near, candidates);
+        scratch.near.resize_with(F::PIECES, Vec::new);
+        scratch.candidates.clear();
+        for piece in 0..F::PIECES {
+            self.propose(slot, piece, scratch);
         }
         for place in &self.places.all[self.places.of(slot)] {
             let piece = usize::from(place.piece);
-            candidates.push(Candidate { x: place.x, piece, score: 0.0 });
+            scratch.candidates.push(Candidate { x: place.x, piece, score: 0.0 });
         }
         let mut best = 0;
-        for at in 0..candidates.len() {
-            let Candidate { x, piece, .. } = candidates[at];
-            candidates[at].score = self.score(slot, piece, &near[piece], &x, leaves);
-            if candidates[at].score > candidates[best].score {
+        for at in 0..scratch.candidates.len() {
+            let Candidate { x, piece, .. } = scratch.candidates[at];
+            let score = self.score(slot, piece, &x, scratch);
+            scratch.candidates[at].score = score;
+            if score > scratch.candidates[best].score {
                 best = at;
             }
         }
-        let refined = self.refine(slot, *candidates.get(best)?, near, leaves);
-        candidates.push(refined);
-        Some(self.kept(candidates, refined.score))
+        let refined = self.refine(slot, *scratch.candidates.get(best)?, scratch);
+        scratch.candidates.push(refined);
+        Some(self.kept(&mut scratch.candidates, refined.score))
     }
 }
 
 impl<const D: usize, F: Family<D>> Context<'_, D, F> {
-    /// Fills `near` with the places of neighbors that are near a piece, and adds candidates on it.
+    /// Collects the places of neighbors that are near a piece, and adds candidates on it.
     #[inline(always)]
-    fn propose(
-        &self,
-        slot: usize,
-        piece: usize,
-        near: &mut Vec<Near<D>>,
-        candidates: &mut Vec<Candidate<D>>,
-    ) {
+    fn propose(&self, slot: usize, piece: usize, scratch: &mut Scratch<D>) {
         let Self { problem: Problem { family, graph, seed, .. }, places, .. } = self;
+        let (near, candidates) = (&mut scratch.near[piece], &mut scratch.candidates);
         let own = family.piece(slot, piece);
         let first = candidates.len();
         let room = CANDIDATES / F::PIECES;
@@ -444,16 +433,9 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
 
     /// Returns the log-posterior of a place, up to a constant.
     #[inline(always)]
-    fn score(
-        &self,
-        slot: usize,
-        piece: usize,
-        near: &[Near<D>],
-        x: &[f32; D],
-        leaves: &mut Vec<Range<usize>>,
-    ) -> f32 {
+    fn score(&self, slot: usize, piece: usize, x: &[f32; D], scratch: &mut Scratch<D>) -> f32 {
         let (mut sum, mut product, mut ratio) = (0.0, 1.0f32, 1.0f32);
-        for y in near {
+        for y in &scratch.near[piece] {
             let u = distance2(x, &y.x).sqrt() * y.inverse_width;
             ratio += y.weight * self.tables.at(y.class, u);
             if !y.goes_on {
@@ -476,6 +458,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             0.0
         } else {
             let radius = DENSITY_RADIUS * self.places.typical;
+            let leaves = &mut scratch.leaves;
             let density = self.crowd.density(slot as u32, x, radius * radius, leaves);
             DENSITY_WEIGHT * ln(LEAST_DENSITY + density)
         };
@@ -487,13 +470,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
 
     /// Moves a candidate along its piece while that improves its score, in steps that become shorter.
     #[inline(always)]
-    fn refine(
-        &self,
-        slot: usize,
-        start: Candidate<D>,
-        near: &[Vec<Near<D>>],
-        leaves: &mut Vec<Range<usize>>,
-    ) -> Candidate<D> {
+    fn refine(&self, slot: usize, start: Candidate<D>, scratch: &mut Scratch<D>) -> Candidate<D> {
         let (mut best, piece) = (start, start.piece);
         let own = self.problem.family.piece(slot, piece);
         // Directions of a plane are the axes other than its normal.
@@ -511,7 +488,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 for step in [step, -step] {
                     let moved = std::array::from_fn(|c| best.x[c] + step * direction[c]);
                     let x = own.project(&moved);
-                    let score = self.score(slot, piece, &near[piece], &x, leaves);
+                    let score = self.score(slot, piece, &x, scratch);
                     if score > best.score {
                         best = Candidate { x, piece, score };
                         continue 'steps;

@@ -20,7 +20,6 @@ const PASSES: (usize, usize) = (6, 3);
 /// Number of random pairs that every class is given: a class with few edges says little.
 const PRIOR: f64 = 10.0;
 
-/// Likelihood ratios of edges by class and distance.
 pub(super) struct Tables {
     /// Per class, the distribution of the distance over bins.
     bins: Vec<[f64; BINS]>,
@@ -116,7 +115,6 @@ impl Tables {
         Self { bins, ratios }
     }
 
-    /// Returns `L_c(u) - 1`.
     #[inline(always)]
     pub(super) fn at(&self, class: u8, u: f32) -> f32 {
         let at = (u * PER_WIDTH).min((ENTRIES - 1) as f32);

@@ -17,7 +17,6 @@ const MOST_OF_TIES: usize = 64;
 /// A record, on the axis that it is believed to have exchanged.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side {
-    /// The axis; [`LOST`] if the record was not recovered.
     pub(super) axis: usize,
     pub(super) published: f32,
     pub(super) estimate: f32,

@@ -6,7 +6,7 @@
 //! 2. scores each candidate `x` in nats by
 //!    `sum over edges j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x) + ln p_range(x)`. If the best candidate
 //!    elsewhere is nearly as good, the records that pass near the two decide;
-//! 3. refines the best candidate by weighted least squares (`least_squares`).
+//! 3. refines the best candidate by weighted least squares.
 //!
 //! `odds_j` are the odds that edge `j` leads to a true neighbor, `p_true` is the density of true neighbors at a distance, and
 //! `p_random` that of the estimates of all slots. They are learned from the current estimates (`neighbor_distribution`, `map::grid`).
@@ -18,7 +18,6 @@
 //! All slots of a turn read the old estimates, so the result depends neither on order nor on threads. If all slots moved in one
 //! turn, two neighbors could exchange places forever. So even and odd slots take turns after the first iteration.
 
-mod least_squares;
 mod neighbor_distribution;
 mod update;
 mod votes;
@@ -27,7 +26,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use crate::recover::joint::neighbor_distribution::NeighborDistribution;
+use crate::recover::joint::neighbor_distribution::{Learning, REACH};
 use crate::recover::joint::update::{Context, TUBE};
 use crate::recover::map::{
     Density, Family, along_curve, distance2, evenly, record_of, solve_slots,
@@ -64,8 +63,8 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     let least_radius = (ROUNDING * farthest).max(f32::MIN_POSITIVE);
     let learn = |estimates: &[Estimate<D>], radius: f32| {
         let density = Density::new(estimates, &problem.listed, SMOOTH * radius);
-        let neighbors =
-            NeighborDistribution::learn(problem, estimates, &density, radius, least_radius);
+        let learning = Learning { problem, estimates, density: &density, reach: REACH * radius };
+        let neighbors = learning.distribution(least_radius);
         (density, neighbors)
     };
     let (mut density, mut neighbors) = learn(&start, F::MOST_RADIUS * problem.delta);

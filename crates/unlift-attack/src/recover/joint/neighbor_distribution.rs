@@ -12,7 +12,7 @@ use crate::recover::problem::{Problem, RANDOM, Sampled};
 use crate::recover::result::Estimate;
 
 /// True neighbors are counted within this many radii, which hold nearly all of them.
-const REACH: f32 = 4.0;
+pub(super) const REACH: f32 = 4.0;
 /// Number of bins of the distance, from 0 to the reach: 12 per radius.
 const BINS: usize = 48;
 /// First bin of distances too large for true neighbors: three radii.
@@ -31,7 +31,6 @@ const FRACTION: (f64, f64) = (5e-4, 0.95);
 pub(super) struct NeighborDistribution {
     /// Radius that holds half of the true neighbors' estimates.
     pub(super) radius: f32,
-    /// Odds that an edge leads to a true neighbor, per class.
     pub(super) odds: [f32; CLASSES],
     /// Fraction of true neighbors among the estimates at the ends of edges.
     pub(super) fraction: f32,
@@ -48,29 +47,6 @@ pub(super) struct NeighborDistribution {
 }
 
 impl NeighborDistribution {
-    /// Learns the distribution from `estimates`, of neighbors within [`REACH`] times `radius`; its own is at least `least_radius`.
-    pub(super) fn learn<const D: usize, F: Family<D>>(
-        problem: &Problem<'_, D, F>,
-        estimates: &[Estimate<D>],
-        density: &Density<D>,
-        radius: f32,
-        least_radius: f32,
-    ) -> Self {
-        let learning = Learning { problem, estimates, density, reach: REACH * radius };
-        let part = |rows: &[Sampled]| {
-            let mut tally = Tally::ZERO;
-            for row in rows.iter().filter(|row| estimates[row.slot].is_known()) {
-                learning.count(row, &mut tally);
-            }
-            tally
-        };
-        // The length is fixed, so sums do not depend on the number of threads.
-        let parts: Vec<Tally> = problem.sample.par_chunks(256).map(part).collect();
-        let mut total = Tally::ZERO;
-        parts.iter().for_each(|part| total.merge(part));
-        learning.distribution(&total, least_radius)
-    }
-
     /// Per class, the odds that one end of an edge is a true neighbor: half of the odds if it leads to two slots.
     pub(super) fn odds_per_end(&self, graph: &Graph) -> [f32; CLASSES] {
         std::array::from_fn(|class| match graph.is_either(class as u8) {
@@ -80,12 +56,12 @@ impl NeighborDistribution {
     }
 }
 
-struct Learning<'a, const D: usize, F: Family<D>> {
-    problem: &'a Problem<'a, D, F>,
-    estimates: &'a [Estimate<D>],
-    density: &'a Density<D>,
+pub(super) struct Learning<'a, const D: usize, F: Family<D>> {
+    pub(super) problem: &'a Problem<'a, D, F>,
+    pub(super) estimates: &'a [Estimate<D>],
+    pub(super) density: &'a Density<D>,
     /// True neighbors are counted within this length times the local stretch.
-    reach: f32,
+    pub(super) reach: f32,
 }
 
 impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
@@ -127,8 +103,20 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
         }
     }
 
-    fn distribution(&self, tally: &Tally, least_radius: f32) -> NeighborDistribution {
-        let Self { problem: Problem { graph, delta, .. }, reach, .. } = *self;
+    /// Returns the learned distribution; its radius is at least `least_radius`.
+    pub(super) fn distribution(&self, least_radius: f32) -> NeighborDistribution {
+        let Self { problem: Problem { graph, delta, sample, .. }, reach, .. } = *self;
+        let part = |rows: &[Sampled]| {
+            let mut tally = Tally::ZERO;
+            for row in rows.iter().filter(|row| self.estimates[row.slot].is_known()) {
+                self.count(row, &mut tally);
+            }
+            tally
+        };
+        // The length is fixed, so sums do not depend on the number of threads.
+        let parts: Vec<Tally> = sample.par_chunks(256).map(part).collect();
+        let mut tally = Tally::ZERO;
+        parts.iter().for_each(|part| tally.merge(part));
         let [(all, fraction_of_all), (mutual, fraction_of_mutual)] =
             [0, 1].map(|kind| tally.excess::<D>(kind));
         let mut radius = median_radius(&all);

@@ -17,7 +17,6 @@ pub(crate) const CELLS: usize = 1 << 15;
 /// Least density, as a fraction of the mean: with chance near 0, a single vote would decide.
 const FLOOR: f32 = 0.05;
 
-/// Density of records per cell.
 #[derive(Clone, Debug)]
 pub(crate) struct ChanceField<const D: usize> {
     pub(crate) grid: Grid<D>,
@@ -93,7 +92,21 @@ pub(crate) fn of_lines<const D: usize>(
         let chosen: Vec<usize> = evenly(rows.len(), CELLS).filter(of_others).collect();
         let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
         let mut total = Grid::over(low, high, CELLS);
-        let lengths = |records: &[usize]| lengths(total.clone(), rows, &counts, records);
+        // Adds the lengths of some records, each as often as it is listed.
+        let lengths = |records: &[usize]| {
+            let mut grid = total.clone();
+            for &record in records {
+                let (row, weight) = (&rows[record], counts[record] as f32);
+                let Some((from, to)) = grid.clip(row) else { continue };
+                let steps = ((to - from) / grid.cell).ceil().max(1.0);
+                let step = (to - from) / steps;
+                for i in 0..steps as i32 {
+                    let cell = grid.index(&row.at(from + (i as f32 + 0.5) * step));
+                    grid.values[cell] += weight * step;
+                }
+            }
+            grid
+        };
         // Eight parts for any number of threads, so that the order of sums is fixed.
         let parts: Vec<Grid<D>> =
             chosen.par_chunks(chosen.len().div_ceil(8).max(1)).map(lengths).collect();
@@ -105,28 +118,6 @@ pub(crate) fn of_lines<const D: usize>(
     (0..n_groups.unwrap_or(1)).map(field).collect()
 }
 
-/// Adds the lengths of some records, each as often as it is listed, to a grid.
-fn lengths<const D: usize>(
-    mut grid: Grid<D>,
-    rows: &[LineRow<D>],
-    counts: &[u32],
-    records: &[usize],
-) -> Grid<D> {
-    for &record in records {
-        let (row, weight) = (&rows[record], counts[record] as f32);
-        let inside = grid.clip(&row.through, &row.direction, row.floor(), row.to);
-        let Some((from, to)) = inside else { continue };
-        let steps = ((to - from) / grid.cell).ceil().max(1.0);
-        let step = (to - from) / steps;
-        for i in 0..steps as i32 {
-            let cell = grid.index(&row.at(from + (i as f32 + 0.5) * step));
-            grid.values[cell] += weight * step;
-        }
-    }
-    grid
-}
-
-/// Returns how many lists name each record.
 pub(crate) fn times_listed(lists: &Neighborhoods, n_records: usize) -> Vec<u32> {
     let mut counts = vec![0; n_records];
     lists.records().iter().for_each(|record| counts[record.index()] += 1);

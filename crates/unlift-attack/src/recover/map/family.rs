@@ -26,7 +26,6 @@ pub(crate) struct Piece<const D: usize> {
     pub(crate) along: [[f32; D]; D],
     /// Direction of a half-line or a chord; zero for other pieces.
     pub(crate) sense: [f32; D],
-    /// Length in that direction.
     pub(crate) to: f32,
     /// Whether the piece is a ray: a point near `through` is near all rays of that center.
     pub(crate) from_center: bool,
@@ -56,7 +55,6 @@ impl<const D: usize> Piece<D> {
 
 /// Records of one family: where a point of theirs may be, how near they pass to a place, and how likely that is by chance.
 pub(crate) trait Family<const D: usize>: Sync {
-    /// Number of pieces of each feasible set.
     const PIECES: usize = 1;
     /// Whether pieces are planes with a normal, not lines with a direction.
     const IS_PLANE: bool = false;
@@ -300,11 +298,8 @@ pub(crate) struct PlaneFamily<'a, const D: usize> {
     by_axis: [SortedPlanes; D],
 }
 
-/// The planes of one axis.
 struct SortedPlanes {
-    /// Records in order of their offsets.
     order: Vec<u32>,
-    /// Distance between the quartiles of the offsets.
     quartiles: f64,
     /// Sorted offsets if the map has separate parts along this axis, else empty.
     in_parts: Vec<f32>,
@@ -352,7 +347,6 @@ impl<'a, const D: usize> PlaneFamily<'a, D> {
         usize::from(self.planes.axis()[record])
     }
 
-    /// Sorts `listed` planes by axis.
     pub(crate) fn gather(&self, listed: &[RecordId], by_axis: &mut Vec<Vec<(f32, RecordId)>>) {
         by_axis.resize_with(D, Vec::new);
         by_axis.iter_mut().for_each(Vec::clear);

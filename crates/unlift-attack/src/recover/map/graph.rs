@@ -23,12 +23,10 @@ pub(crate) enum Side {
 const SCORE_CLASSES: usize = 8;
 /// Quantiles of all scores at which classes begin: finer at the top, where most true neighbors are.
 const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
-/// Number of scores from which these quantiles are computed.
 const SCORES: usize = 1 << 16;
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 /// Largest number of reverse edges of a slot, in mean list lengths: a record in very many lists is in most of them by mistake.
 const MOST_REVERSE: usize = 3;
-/// Slots per parallel task.
 const PART: usize = 1 << 12;
 
 /// Returns the record of a slot. Records have one or two slots, so a shift replaces a division.
@@ -64,7 +62,6 @@ fn class_of(lists: &Neighborhoods, bounds: &[f32], side: Side, slot: usize, at: 
     (side as usize * SCORE_CLASSES + lists.scores().map_or(0, class)) as u8
 }
 
-/// Slots that list each record, ascending.
 #[derive(Debug)]
 pub(crate) struct Listers {
     offsets: Vec<usize>,
@@ -107,7 +104,6 @@ pub(crate) struct Graph {
 }
 
 impl Graph {
-    /// Creates the edges of `lists` in both directions.
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
         let listers = Listers::new(lists, n_slots / slots_per_record);
@@ -184,7 +180,6 @@ impl Graph {
         end..end + 1 + usize::from(self.is_either(class))
     }
 
-    /// Returns the slots of a record.
     pub(crate) fn slots_of(&self, record: usize) -> Range<usize> {
         record * self.slots_per_record..(record + 1) * self.slots_per_record
     }
@@ -203,7 +198,6 @@ impl Graph {
         self.ends.len()
     }
 
-    /// Returns how many edges lead to each record.
     pub(crate) fn times_listed(&self) -> Vec<u32> {
         let mut counts = vec![0; self.n_slots() / self.slots_per_record];
         for &end in &self.ends {

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::recover::map::graph::record_of;
+use crate::recover::map::lines::LineRow;
 use crate::recover::map::places::{sample, trimmed_box};
 use crate::recover::result::Estimate;
 
@@ -42,15 +43,6 @@ impl<const D: usize> Grid<D> {
             cell *= 1.05;
         }
         Self::of_cells(low, high, cell as f32)
-    }
-
-    /// Creates empty cells of a given size over the box from `low` to `high`; larger cells if there would be more than `most`.
-    fn with_cell(low: [f32; D], high: [f32; D], cell: f32, most: usize) -> Self {
-        let side = |c: usize| f64::from((high[c] - low[c]) / cell).ceil().max(1.0);
-        match (0..D).map(side).product::<f64>() <= most as f64 {
-            true => Self::of_cells(low, high, cell),
-            false => Self::over(low, high, most),
-        }
     }
 
     fn of_cells(low: [f32; D], high: [f32; D], cell: f32) -> Self {
@@ -136,14 +128,9 @@ impl<const D: usize> Grid<D> {
         (index, weight)
     }
 
-    /// Returns the part `[from, to]` of the line `through + t direction` inside the box, if any.
-    pub(crate) fn clip(
-        &self,
-        through: &[f32; D],
-        direction: &[f32; D],
-        mut from: f32,
-        mut to: f32,
-    ) -> Option<(f32, f32)> {
+    /// Returns the part `[from, to]` of a row inside the box, if any.
+    pub(crate) fn clip(&self, row: &LineRow<D>) -> Option<(f32, f32)> {
+        let (LineRow { through, direction, .. }, mut from, mut to) = (row, row.floor(), row.to);
         for c in 0..D {
             let (low, high) = (self.low[c], self.low[c] + self.cell * self.dims[c] as f32);
             if direction[c].abs() < 1e-12 {
@@ -206,7 +193,12 @@ impl<const D: usize> Density<D> {
         let n = estimates.len();
         let places = sample(estimates);
         let (low, high) = trimmed_box(&places);
-        let mut grid = Grid::with_cell(low, high, radius * CELL, (4 * n).max(1 << 16));
+        let (cell, most) = (radius * CELL, (4 * n).max(1 << 16));
+        let side = |c: usize| f64::from((high[c] - low[c]) / cell).ceil().max(1.0);
+        let mut grid = match (0..D).map(side).product::<f64>() <= most as f64 {
+            true => Grid::of_cells(low, high, cell),
+            false => Grid::over(low, high, most),
+        };
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
         for (slot, estimate) in estimates.iter().enumerate() {

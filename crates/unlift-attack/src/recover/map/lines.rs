@@ -157,7 +157,6 @@ impl<const D: usize> Columns<D> {
         self.0.iter_mut().for_each(|column| column.resize(n, x));
     }
 
-    /// Fills the columns with one row per item.
     #[inline(always)]
     pub(crate) fn fill<T>(&mut self, items: &[T], row: impl Fn(&T) -> [f32; D]) {
         self.resize(items.len(), 0.0);
@@ -167,14 +166,12 @@ impl<const D: usize> Columns<D> {
         }
     }
 
-    /// Returns the first `n` rows.
     #[inline(always)]
     pub(crate) fn first(&self, n: usize) -> [&[f32]; D] {
         std::array::from_fn(|c| &self.0[c][..n])
     }
 }
 
-/// Listed lines in columns.
 #[derive(Default)]
 pub(crate) struct LineColumns<const D: usize> {
     through: Columns<D>,
@@ -274,19 +271,16 @@ impl Sections {
         self.bend[n..].fill(1.0);
     }
 
-    /// Number of sections, with padding.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.at.len()
     }
 
-    /// Number of records that vote.
     #[inline(always)]
     pub(crate) fn n_voting(&self) -> usize {
         self.miss2.iter().map(|&miss2| usize::from(miss2 < NO_VOTE)).sum()
     }
 
-    /// Returns the squared distance from `x(t)` to record `j`.
     #[inline(always)]
     pub(crate) fn squared_distance(&self, j: usize, t: f32) -> f32 {
         let d = t - self.at[j];
@@ -327,7 +321,6 @@ impl Sections {
     }
 }
 
-/// The best position along a feasible line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Peak {
     pub(crate) t: f32,

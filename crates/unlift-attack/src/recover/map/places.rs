@@ -19,7 +19,6 @@ pub(crate) fn evenly(n: usize, n_sampled: usize) -> std::iter::StepBy<Range<usiz
 
 /// A step of an attack that treats each slot on its own. Its hot loops are `#[inline(always)]` where that pays, see [`Kernel`].
 pub(crate) trait Step: Sync {
-    /// Buffers of one thread.
     type Scratch: Default;
     type Output: Send;
 
@@ -118,7 +117,6 @@ pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     sum
 }
 
-/// Returns the unit vector along an axis.
 #[inline(always)]
 pub(crate) fn unit<const D: usize>(axis: usize) -> [f32; D] {
     std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 })
