@@ -6,6 +6,8 @@
 //! A query first searches the smallest node around its point that holds enough others. The K-th distance found there is an upper bound.
 //! Then it takes every point within that bound, so that no tie is missed.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::Error;
@@ -151,12 +153,7 @@ impl<'a, const D: usize> Knn<'a, D> {
 
     /// Calls `of` with ranges of the leaf order that contain every point whose squared distance to a position is at most `bound`.
     #[inline(always)]
-    pub(crate) fn leaves(
-        &self,
-        position: &[f64; D],
-        bound: f64,
-        of: impl FnMut(std::ops::Range<usize>),
-    ) {
+    pub(crate) fn leaves(&self, position: &[f64; D], bound: f64, of: impl FnMut(Range<usize>)) {
         self.leaves_within(position, (bound, usize::MAX), usize::MAX, of);
     }
 
@@ -196,7 +193,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         query: &[f64; D],
         (bound, most): (f64, usize),
         but: usize,
-        mut take: impl FnMut(std::ops::Range<usize>),
+        mut take: impl FnMut(Range<usize>),
     ) {
         let mut stack = [0usize; usize::BITS as usize];
         let mut height = 1;
@@ -228,7 +225,7 @@ impl<'a, const D: usize> Knn<'a, D> {
     /// Returns the places of a node; of coinciding points only the leaves with the `most` lowest rows, as no others can be among the
     /// nearest.
     #[inline(always)]
-    fn lowest(&self, node: usize, most: usize) -> std::ops::Range<usize> {
+    fn lowest(&self, node: usize, most: usize) -> Range<usize> {
         let all = self.range(node);
         if all.len() <= most || !self.is_pile(node) {
             return all;
@@ -244,7 +241,7 @@ impl<'a, const D: usize> Knn<'a, D> {
     }
 
     #[inline(always)]
-    fn range(&self, node: usize) -> std::ops::Range<usize> {
+    fn range(&self, node: usize) -> Range<usize> {
         let level = usize::BITS - 1 - node.leading_zeros();
         let below = self.depth - level;
         let first = (node << below) - (1 << self.depth);
@@ -308,11 +305,10 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
-        let Self { tree, query, own, leaf, k, found } = self;
-        let n_leaves = 1usize << tree.depth;
+    fn run(mut self) {
+        let Self { tree, k, .. } = self;
         // The smallest node with so many others that their K-th distance is near the true one.
-        let mut near = n_leaves + leaf;
+        let mut near = (1 << tree.depth) + self.leaf;
         while near > 1 && tree.range(near).len() < 2 * k + 1 {
             near /= 2;
         }
@@ -320,46 +316,39 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
         while near > 1 && tree.is_pile(near / 2) {
             near /= 2;
         }
-        let most = k + 1;
-        take(tree, &query, own, tree.lowest(near, most), f64::INFINITY, found);
+        let (most, query) = (k + 1, self.query);
+        self.take(tree.lowest(near, most), f64::INFINITY);
         if near == 1 {
             return;
         }
-        let bound = found.select_nth_unstable_by_key(k - 1, canonical).1.0;
-        found.retain(|item| item.0 <= bound);
-        tree.leaves_within(&query, (bound, most), near, |places| {
-            take(tree, &query, own, places, bound, found);
-        });
+        let bound = self.found.select_nth_unstable_by_key(k - 1, canonical).1.0;
+        self.found.retain(|item| item.0 <= bound);
+        tree.leaves_within(&query, (bound, most), near, |places| self.take(places, bound));
     }
 }
 
-/// Appends the points at `places` within the squared distance `bound` of `query`.
-#[inline(always)]
-fn take<const D: usize>(
-    tree: &Knn<'_, D>,
-    query: &[f64; D],
-    own: u32,
-    places: std::ops::Range<usize>,
-    bound: f64,
-    found: &mut Vec<(f64, u32)>,
-) {
-    let mut at = places.start;
-    while at < places.end {
-        let end = places.end.min(at + LEAF);
-        let mut squared = [0.0; LEAF];
-        // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
-        for (column, center) in tree.columns.iter().zip(query) {
-            for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
-                let d = center - x;
-                *sum += d * d;
+impl<const D: usize> Search<'_, '_, D> {
+    /// Appends the points at `places` within the squared distance `bound`.
+    #[inline(always)]
+    fn take(&mut self, places: Range<usize>, bound: f64) {
+        let mut at = places.start;
+        while at < places.end {
+            let end = places.end.min(at + LEAF);
+            let mut squared = [0.0; LEAF];
+            // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
+            for (column, center) in self.tree.columns.iter().zip(&self.query) {
+                for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
+                    let d = center - x;
+                    *sum += d * d;
+                }
             }
-        }
-        for (place, &distance) in (at..end).zip(&squared) {
-            if distance <= bound && place as u32 != own {
-                found.push((distance, tree.rows[place]));
+            for (place, &distance) in (at..end).zip(&squared) {
+                if distance <= bound && place as u32 != self.own {
+                    self.found.push((distance, self.tree.rows[place]));
+                }
             }
+            at = end;
         }
-        at = end;
     }
 }
 

@@ -45,8 +45,21 @@ impl Neighborhoods {
         }
         for slot in 0..n_slots {
             let range = offsets[slot] as usize..offsets[slot + 1] as usize;
-            sort_row(&mut records[range.clone()], scores.as_mut().map(|s| &mut s[range.clone()]));
-            check_row(slot, &records[range], n_records, slots_per_record)?;
+            let row = &mut records[range.clone()];
+            sort_row(row, scores.as_mut().map(|scores| &mut scores[range]));
+            let wrong = |expected: String, found: String| {
+                Err(Error::new(format!("neighborhood of slot {slot}"), expected, found))
+            };
+            if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
+                return wrong("each record once".into(), format!("record {} twice", pair[0].0));
+            }
+            if let Some(last) = row.last().filter(|last| last.index() >= n_records) {
+                return wrong(format!("records below {n_records}"), last.0.to_string());
+            }
+            let own = RecordId::from_index(slot / slots_per_record);
+            if row.binary_search(&own).is_ok() {
+                return wrong("other records".into(), format!("its own record {}", own.0));
+            }
         }
         Ok(Self { offsets, records, scores, about: About::default() })
     }
@@ -128,29 +141,6 @@ impl Neighborhoods {
     pub fn longest(&self) -> usize {
         self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
     }
-}
-
-/// Rejects a sorted list with a record twice, out of range, or the slot's own.
-fn check_row(
-    slot: usize,
-    row: &[RecordId],
-    n_records: usize,
-    slots_per_record: usize,
-) -> Result<(), Error> {
-    let wrong = |expected: String, found: String| {
-        Err(Error::new(format!("neighborhood of slot {slot}"), expected, found))
-    };
-    if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
-        return wrong("each record once".into(), format!("record {} twice", pair[0].0));
-    }
-    if let Some(last) = row.last().filter(|last| last.index() >= n_records) {
-        return wrong(format!("records below {n_records}"), last.0.to_string());
-    }
-    let own = RecordId::from_index(slot / slots_per_record);
-    if row.binary_search(&own).is_ok() {
-        return wrong("other records".into(), format!("its own record {}", own.0));
-    }
-    Ok(())
 }
 
 fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {

@@ -27,7 +27,7 @@ struct Attack<'a, const D: usize> {
     /// Whether [`Builtin::Joint`] ends after its first step, `consensus`.
     only_starts: bool,
     /// Estimates that stay as they are, per slot; empty if none is known.
-    known: Vec<Option<Estimate<D>>>,
+    known: &'a [Option<Estimate<D>>],
 }
 
 impl<const D: usize> Solver<D> for Builtin {
@@ -66,7 +66,8 @@ fn solve<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
     check(released, lists, options)?;
-    Attack::new(released, lists, options, solver).run()
+    let options = *options;
+    Attack { released, lists, options, solver, only_starts: false, known: &[] }.run()
 }
 
 /// Runs our attacks on the records alone; returns the name and result of each. Planes and rays from one center yield nothing.
@@ -94,12 +95,13 @@ pub fn records_alone<const D: usize>(
     // Planes and rays from one center have no geometric lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
-        let joint = Attack::new(released, &lists, &options, Builtin::Joint).run()?;
+        let (lists, solver) = (&lists, Builtin::Joint);
+        let joint = Attack { released, lists, options, solver, only_starts: false, known: &[] };
+        let recovered = joint.run()?;
         // Delta does not need to be learned twice.
-        let options = RecoverOptions { delta: Delta::Fixed(joint.delta()), ..options };
-        let start = Attack::new(released, &lists, &options, Builtin::Joint);
-        attacks.push(("geometric, consensus", Attack { only_starts: true, ..start }.run()?));
-        attacks.push(("geometric, joint", joint));
+        let options = RecoverOptions { delta: Delta::Fixed(recovered.delta()), ..options };
+        let start = Attack { options, only_starts: true, ..joint }.run()?;
+        attacks.extend([("geometric, consensus", start), ("geometric, joint", recovered)]);
     }
     Ok(attacks)
 }
@@ -117,8 +119,9 @@ pub fn recover_from<const D: usize>(
 ) -> Result<Recovered<D>, Error> {
     check(released, lists, options)?;
     released.fingerprint().expect(known.about().map)?;
-    let known = (0..released.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
-    Attack { known, ..Attack::new(released, lists, options, Builtin::Joint) }.run()
+    let known: Vec<_> = (0..released.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
+    let (known, options, solver) = (&known[..], *options, Builtin::Joint);
+    Attack { released, lists, options, solver, only_starts: false, known }.run()
 }
 
 /// Rejects options out of range, and lists of another map.
@@ -138,16 +141,7 @@ pub(super) fn check<const D: usize>(
     options.check()
 }
 
-impl<'a, const D: usize> Attack<'a, D> {
-    fn new(
-        released: &'a Released<D>,
-        lists: &'a Neighborhoods,
-        options: &RecoverOptions,
-        solver: Builtin,
-    ) -> Self {
-        Self { released, lists, options: *options, solver, only_starts: false, known: Vec::new() }
-    }
-
+impl<const D: usize> Attack<'_, D> {
     fn run(&self) -> Result<Recovered<D>, Error> {
         let Self { released, lists, .. } = *self;
         let at =
@@ -191,7 +185,7 @@ impl<'a, const D: usize> Attack<'a, D> {
             estimates
         } else if let Some(graph) = graph.as_ref().filter(|_| !self.only_starts) {
             let problem = Problem::new(family, (lists, graph), delta as f32, seed);
-            let mut estimates = settle(joint(&problem, start(), &self.known));
+            let mut estimates = settle(joint(&problem, start(), self.known));
             for _ in 0..F::RERUNS {
                 estimates = settle(joint(&problem, estimates, &[]));
             }

@@ -81,7 +81,7 @@ fn pairs<const D: usize>(
     for _ in 0..ROUNDS {
         let likelier = |i: usize, j: usize| {
             let away = (sides[j].published - sides[i].estimate).abs();
-            distances.density(class[i], away) * rarity[i]
+            distances.table[class[i]][distances.step(away)] * rarity[i]
         };
         let odds = |i: usize, e: usize| {
             let j = partners.of[e] as usize;
@@ -226,12 +226,6 @@ impl Distances {
     #[inline(always)]
     fn step(&self, away: f32) -> usize {
         ((away / self.reach * STEPS as f32) as usize).min(STEPS - 1)
-    }
-
-    /// Returns the density of a good estimate's distance times the fraction of good ones.
-    #[inline(always)]
-    fn density(&self, class: usize, away: f32) -> f64 {
-        self.table[class][self.step(away)]
     }
 
     /// Returns the weight of a record without a known partner, per class.

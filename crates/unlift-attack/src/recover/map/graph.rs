@@ -239,12 +239,14 @@ mod tests {
     fn expected(
         lists: &Neighborhoods,
         per: usize,
+        bounds: &[f32],
         slot: usize,
-        of_score: &dyn Fn(usize) -> u8,
-    ) -> Vec<(u32, u8)> {
-        let class =
-            |side: Side, entry: usize| (side as usize * SCORE_CLASSES) as u8 + of_score(entry);
-        let entry = |slot: usize, at: usize| lists.offsets()[slot] as usize + at;
+    ) -> Vec<(usize, u8)> {
+        let class = |side: Side, slot: usize, at: usize| {
+            let score = lists.scores_of(slot).unwrap()[at];
+            let of_score = bounds.partition_point(|&bound| bound <= score);
+            (side as usize * SCORE_CLASSES + of_score) as u8
+        };
         let own = RecordId::from_index(slot / per);
         let place = |by: usize| Some((by, lists.of(by).iter().position(|&record| record == own)?));
         let named_by: Vec<(usize, usize)> = (0..lists.n_slots()).filter_map(place).collect();
@@ -255,13 +257,10 @@ mod tests {
         for (at, record) in list.iter().enumerate() {
             let is_mutual = reverse.clone().any(|by| by.0 / per == record.index());
             let side = if is_mutual { Side::Mutual } else { Side::Forward };
-            edges.push((record.0 * per as u32, class(side, entry(slot, at))));
+            edges.push((record.index() * per, class(side, slot, at)));
         }
-        for &(by, at) in reverse {
-            if !list.contains(&RecordId::from_index(by / per)) {
-                edges.push((by as u32, class(Side::Reverse, entry(by, at))));
-            }
-        }
+        let only = reverse.filter(|by| !list.contains(&RecordId::from_index(by.0 / per)));
+        edges.extend(only.map(|&(by, at)| (by, class(Side::Reverse, by, at))));
         edges.sort_unstable_by_key(|edge| edge.0);
         edges
     }
@@ -276,16 +275,12 @@ mod tests {
             };
             let (single, parallel) = (on(1), on(3));
             let bounds = score_bounds(&lists);
-            let scores = lists.scores().unwrap();
-            let of_score =
-                |entry: usize| bounds.partition_point(|&bound| bound <= scores[entry]) as u8;
             let mut n_edges = 0;
             for slot in 0..lists.n_slots() {
-                let expected = expected(&lists, per, slot, &of_score);
+                let expected = expected(&lists, per, &bounds, slot);
                 n_edges += expected.len();
                 for graph in [&single, &parallel] {
-                    let edges = graph.of(slot).map(|(end, class)| (end as u32, class));
-                    assert_eq!(edges.collect::<Vec<_>>(), expected, "slot {slot}");
+                    assert_eq!(graph.of(slot).collect::<Vec<_>>(), expected, "slot {slot}");
                 }
             }
             assert_eq!([single.len(), parallel.len()], [n_edges; 2]);

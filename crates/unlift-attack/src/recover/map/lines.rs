@@ -263,12 +263,11 @@ impl Sections {
     #[inline(always)]
     pub(crate) fn resize(&mut self, n: usize) {
         let padded = n.next_multiple_of(LANES);
-        self.at.resize(padded, 0.0);
-        self.miss2.resize(padded, NO_VOTE);
-        self.bend.resize(padded, 1.0);
-        self.at[n..].fill(0.0);
-        self.miss2[n..].fill(NO_VOTE);
-        self.bend[n..].fill(1.0);
+        let columns = [(&mut self.at, 0.0), (&mut self.miss2, NO_VOTE), (&mut self.bend, 1.0)];
+        for (column, padding) in columns {
+            column.truncate(n);
+            column.resize(padded, padding);
+        }
     }
 
     #[inline(always)]
