@@ -1,7 +1,6 @@
 //! Vector instructions, chosen at run time. This is the only module with `unsafe`.
 //!
-//! A [`Kernel`] is plain scalar code, compiled twice: for the portable baseline and for AVX2. The compiler vectorizes both. It never
-//! fuses or reorders floating-point operations, so both give the same bits; tests compare them.
+//! A [`Kernel`] is scalar code, vectorized by the compiler for the baseline and for AVX2. Both give the same bits; tests compare them.
 
 #![allow(unsafe_code)]
 
@@ -57,8 +56,7 @@ const QUAD: usize = 4;
 /// Raises `best[i][j]` to the product of row `i` of `left` with column `j` of `right`.
 ///
 /// `left` has [`BLOCK`] rows of `depth` values. `right` has [`BLOCK`] columns of `depth` values, each at the index that [`packed`] returns.
-/// `best` is `(BLOCK, BLOCK)`, row-major. Sums of integers do not depend on their order. Intrinsics are used because two AVX2
-/// instructions do 32 multiplications here, and one of AVX-512 does 64, far more than vectorized loops.
+/// `best` is `(BLOCK, BLOCK)`, row-major. Intrinsics do up to 64 multiplications at once, far more than vectorized loops.
 ///
 /// Values are at most 127, and no product of two rows may exceed `i16::MAX`, which rows of Euclidean norm below 181 never do.
 ///

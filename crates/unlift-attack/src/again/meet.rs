@@ -152,8 +152,7 @@ const MOST: f64 = 0.1;
 
 /// Returns the probability of each link and the noise of the right ones. A distance of 1 is usual of wrong links.
 ///
-/// Distances of wrong links are exponential, those of right ones are Cauchy's, because the noise depends on the angle between
-/// records. Their scale and share are learned from all links (expectation maximization).
+/// Distances of wrong links are exponential, those of right ones are Cauchy's. Scale and share are learned (expectation maximization).
 pub(super) fn trust(distances: &[f64]) -> (Vec<f64>, f64) {
     if distances.is_empty() {
         return (Vec::new(), LEAST);

@@ -1,9 +1,8 @@
 //! Points whose coordinates were swapped in two releases.
 //!
-//! The two records of a point agree except in the swapped coordinates. If these are of two axes, the point is the first record with one
-//! of them replaced, and which one is the same question for the partner of the swap: it has the same two values, exchanged. Where a point
-//! was swapped along one axis in both releases, three or more points share values in a cycle, which tells who is whose partner
-//! (docs/decisions/again.md). So one answer decides many, and few stay open: those go where points are denser.
+//! The two records of a point agree except in the swapped coordinates. If these are of two axes, which one the point has is the same
+//! question for the partner of the swap. Where a point was swapped along one axis in both releases, points share values in a cycle
+//! (docs/decisions/again.md). So one answer decides many; the others go where points are denser.
 
 use super::Place;
 use crate::geometry::knn::Knn;

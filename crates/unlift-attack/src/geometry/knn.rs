@@ -28,7 +28,7 @@ pub struct Knn<'a, const D: usize> {
     boxes: Vec<Bounds<D>>,
     columns: [Vec<f64>; D],
     /// Row at each place of the leaf order.
-    rows: Vec<u32>,
+    pub(crate) rows: Vec<u32>,
     /// Place of each row.
     places: Vec<u32>,
 }
@@ -144,11 +144,6 @@ impl<'a, const D: usize> Knn<'a, D> {
                 }
             }
         });
-    }
-
-    /// Returns the rows leaf by leaf.
-    pub(crate) fn leaf_order(&self) -> &[u32] {
-        &self.rows
     }
 
     /// Calls `of` with ranges of the leaf order that contain every point whose squared distance to a position is at most `bound`.

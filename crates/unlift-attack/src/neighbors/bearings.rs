@@ -11,8 +11,7 @@ pub const REAL: f64 = 1.5;
 /// Rounds in which records with more support count more.
 const ROUNDS: usize = 4;
 
-/// Returns the support of every record by its lists, as a multiple of that by chance; `None` unless records are bearings from one
-/// center. Decoys have little support: their descriptor comes from elsewhere. Listed records count by their own support.
+/// Returns the support of every record by its lists, as a multiple of that by chance; `None` unless records are bearings from one center.
 pub fn support<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Option<Vec<f64>> {
     let rays = released.obfuscation().rays()?;
     let n = rays.center().len();

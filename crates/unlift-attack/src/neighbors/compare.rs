@@ -219,8 +219,7 @@ impl Compared {
     }
 }
 
-/// Compares rows according to `tiles`; each row keeps its `n_best` best partners of other records. Mean and deviation come from
-/// the pairs with every `every`-th row; for 1, from those of `tiles`. Without `every`, neither is computed.
+/// Compares rows according to `tiles`. Mean and deviation come from the pairs with every `every`-th row; for 1, from those of `tiles`.
 ///
 /// What a row keeps depends on the set of its scores alone, so the result does not depend on the number of threads.
 fn compare<L: Likeness>(
@@ -466,8 +465,7 @@ const SAMPLE: usize = 256;
 /// Number of power iterations. An approximate direction suffices.
 const ITERATIONS: usize = 8;
 
-/// Reorders `slots` so that similar descriptors are adjacent. Rows are split at the median along the direction of largest variance,
-/// recursively, until a part is one block. All parts but the last are full.
+/// Reorders `slots` so that similar descriptors are adjacent: splits at the median along the direction of largest variance, recursively.
 fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
     if slots.len() <= BLOCK {
         return;

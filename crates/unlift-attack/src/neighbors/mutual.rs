@@ -79,7 +79,9 @@ fn compare(
 ) -> (Vec<Nearest>, Vec<Nearest>) {
     let mut scores = vec![0.0f32; BLOCK * BLOCK];
     let mut rows = vec![Nearest::NONE; (n_rows - first * BLOCK).min(part.len() * BLOCK)];
-    let mut columns = Columns::new(b.blocks.len() * BLOCK);
+    let least = vec![f32::NEG_INFINITY; b.blocks.len() * BLOCK];
+    let at = vec![u32::MAX; least.len()];
+    let mut columns = Columns { at, first: least.clone(), second: least };
     for (i, (own, rows)) in part.iter().zip(rows.chunks_mut(BLOCK)).enumerate() {
         for (j, other) in b.blocks.iter().enumerate() {
             Cosine.scores(own, other, &mut scores);
@@ -103,11 +105,6 @@ struct Columns {
 }
 
 impl Columns {
-    fn new(n: usize) -> Self {
-        let least = || vec![f32::NEG_INFINITY; n];
-        Self { at: vec![u32::MAX; n], first: least(), second: least() }
-    }
-
     /// Adds the scores of row `at` with the columns from `column` on. Free of branches, so that it is vectorized.
     #[inline(always)]
     fn keep(&mut self, column: usize, scores: &[f32; LANES], at: u32) {

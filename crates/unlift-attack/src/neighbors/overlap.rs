@@ -1,7 +1,6 @@
 //! The source `overlap`: the patches of near SIFT keypoints overlap. It needs no training.
 //!
-//! Two patches are compared on the cells that they share under a hypothesis, which is a turn and a shift. The best
-//! hypothesis counts. A short walk over the best matches reaches neighbors whose patches do not overlap.
+//! Two patches are compared on the cells that they share under the best hypothesis, a turn and a shift. A short walk reaches others.
 
 use super::Neighborhoods;
 use super::compare::{KeptPairs, Likeness, note};

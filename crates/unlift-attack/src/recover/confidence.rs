@@ -166,8 +166,7 @@ fn unknown<const D: usize>(
     }
 }
 
-/// Returns the fraction of rays or planes that equal another one bit for bit: different points hardly ever have equal ones. Other records are
-/// drawn at random, so that coinciding points do not have equal lines or candidates.
+/// Returns the fraction of rays or planes that equal another one, as different points hardly do. Other records are drawn at random.
 fn twins<const D: usize>(obfuscation: &Obfuscation<D>) -> f64 {
     let mut rows: Vec<(u8, [u32; D])> = match obfuscation {
         Obfuscation::Rays(rays) => {

@@ -36,8 +36,7 @@ const LOWEST: i32 = 15;
 const BEYOND_EDGE: f64 = 2.25;
 /// Largest narrow delta for lists with scores, whose wrong entries have similar descriptors.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
-/// If the likely delta of candidates is more than this many times as wide as the chosen one, the likely one is taken. Partners of exchanges
-/// agree exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices the choice is arbitrary.
+/// If the likely delta of candidates is this many times as wide, it is taken: partners agree exactly, so that evidence hardly falls.
 const COLLAPSED: f64 = 4.0;
 
 /// Chooses delta, in the unit of the map. Consensus reads `used`: lists as `given`, or those of both directions. `sharp` is for joint
@@ -68,8 +67,7 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
     if COLLAPSED * chosen < likely { likely } else { chosen }
 }
 
-/// Returns the spacing of points spread evenly over the known bounds, or else over all regions; 0 without both. Axis candidates
-/// publish coordinates, which show whether the bounds are much larger than the range of the points.
+/// Returns the spacing of points spread evenly over the known bounds (or what axis candidates fill of them), or over all regions; else 0.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     let of_regions = || {
         let regions = released.obfuscation().rays()?.regions()?;

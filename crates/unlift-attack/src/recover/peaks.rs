@@ -11,8 +11,7 @@ use crate::released::Released;
 
 /// Returns the points at `peaks`.
 ///
-/// Lists do not change positions. For paired lines they decide which of the two positions belongs to which slot: the cheaper
-/// assignment wins, with the distances to the listed records (Eq. (4)) as cost. With empty lists the order is that along the line.
+/// Lists decide which of the two positions of a paired line belongs to which slot, by the distances to the listed records (Eq. (4)).
 pub(super) fn at_peaks<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,

@@ -370,8 +370,7 @@ impl<const D: usize> Recovered<D> {
 
 /// Per slot, the released descriptor row that belongs to it (supplement B); `None` unless paired lines have descriptors.
 ///
-/// The cheaper of the two assignments wins. The cost of a descriptor and a list is the sum of the distances from the descriptor to
-/// the listed records, each taken to the nearer of the record's two descriptors.
+/// The cheaper assignment wins. Its cost is the sum of the distances from each descriptor to the nearer one of each listed record.
 fn descriptor_rows<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,

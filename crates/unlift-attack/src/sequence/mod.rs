@@ -20,7 +20,7 @@ use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{distance, dot, median, sub, widen};
 use crate::neighbors::{Blocks, Neighborhoods, comparable, mutual};
 use crate::recover::{Confidence, Estimate, RecoverOptions, Recovered, Status, recover_from};
-use crate::released::{Obfuscation, Released};
+use crate::released::{Obfuscation, Rays, Released};
 use crate::{About, Error, RowOrder, Unit};
 
 /// Cosine of the largest angle between the viewing directions of two queries that are compared: 75 degrees.
@@ -42,38 +42,33 @@ impl Query {
     }
 
     fn sight(&self, projection: [[f64; 4]; 3], slot: usize) -> Sight {
-        let origin = self.released.origin();
+        let (records, origin) = (self.released.obfuscation(), self.released.origin());
         let record = slot / self.released.slots_per_record();
         let absolute = |p: &[f32; 2]| [0, 1].map(|c| f64::from(p[c]) + origin[c]);
-        let through = |p: [f64; 2], d: &[f32; 2]| {
+        let through = |(p, d): (&[f32; 2], &[f32; 2])| {
             let [x, y] = widen(d);
             let length = dot(&[x, y], &[x, y]).sqrt();
             let normal = [-y / length, x / length];
-            [normal[0], normal[1], -dot(&normal, &p)]
+            [normal[0], normal[1], -dot(&normal, &absolute(p))]
         };
-        let all = self.released.bounds().unwrap_or(EVERYWHERE);
-        match self.released.obfuscation() {
-            Obfuscation::Lines(lines) => {
-                let line = through(absolute(&lines.foot()[record]), &lines.direction()[record]);
-                Sight::new(projection, all, &[line])
-            }
-            Obfuscation::Rays(rays) => {
-                let center = usize::from(rays.center()[record]);
-                let line = through(absolute(&rays.centers()[center]), &rays.direction()[record]);
-                let region = rays.regions().map(|of| of[center].about(&origin.map(|x| -x)));
-                Sight::new(projection, region.unwrap_or(all), &[line])
+        let at = |axis: usize, x: f64| if axis == 0 { [1.0, 0.0, -x] } else { [0.0, 1.0, -x] };
+        let lines: Vec<[f64; 3]> = match records {
+            Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
+                records.line(record).map(through).into_iter().collect()
             }
             Obfuscation::AxisCandidates(candidates) => {
                 let [u, v] = absolute(&candidates.position()[record]);
-                Sight::new(projection, all, &[[1.0, 0.0, -u], [0.0, 1.0, -v]])
+                vec![at(0, u), at(1, v)]
             }
             Obfuscation::AxisPlanes(planes) => {
                 let axis = usize::from(planes.axis()[record]);
-                let at = f64::from(planes.offset()[record]) + origin[axis];
-                let line = if axis == 0 { [1.0, 0.0, -at] } else { [0.0, 1.0, -at] };
-                Sight::new(projection, all, &[line])
+                vec![at(axis, f64::from(planes.offset()[record]) + origin[axis])]
             }
-        }
+        };
+        let region = |rays: &Rays<2>| Some(rays.regions()?[usize::from(rays.center()[record])]);
+        let region = records.rays().and_then(region).map(|of| of.about(&origin.map(|x| -x)));
+        let area = region.or(self.released.bounds()).unwrap_or(EVERYWHERE);
+        Sight::new(projection, area, &lines)
     }
 }
 
@@ -210,8 +205,7 @@ pub fn with_lists(
     recover_from(&known, &query.released, lists, &options)
 }
 
-/// Predicts whether a fit is right, and its error. A fit is right if more views agree than chance would give: wrong lines pass near the
-/// point, too, and the best of many hypotheses is chosen. Constants are rounded from a fit on RedKitchen (docs/decisions/sequence.md).
+/// Predicts whether a fit is right, and its error: more views agree than by chance (docs/decisions/sequence.md).
 fn confidence(
     fit: &Fit,
     n_views: usize,
@@ -235,8 +229,7 @@ fn confidence(
     Confidence { found: found as f32, scale: (0.33 * noise_px * fit.condition) as f32 }
 }
 
-/// A mutual nearest neighbor is a link if its distance is below this share of the distance of the second nearest. Geometry rejects wrong
-/// links later, so that a strict ratio would only lose right ones (docs/decisions/sequence.md).
+/// A mutual nearest neighbor is a link if its distance is below this share of that of the second nearest (docs/decisions/sequence.md).
 const RATIO: f32 = 0.95;
 
 /// Links between the slots of all queries of a sequence.

@@ -1,7 +1,6 @@
 //! Triangulation of a point from the records of several views, one record per view.
 //!
-//! A line of an image back-projects to a plane through the camera center. Three planes meet in a point, and further ones check it. A
-//! record of axis candidates is one of two lines, so that every subset of three views has eight solutions and a fourth view decides.
+//! Lines of images back-project to planes, of which three meet in a point. Axis candidates are two lines, so that a fourth view decides.
 
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{cross, distance, dot};

@@ -31,7 +31,9 @@ pub(in crate::recover) fn solve<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
 ) -> Vec<Estimate<D>> {
-    let bearings = bearings(rows);
+    let bearing = |(slot, row): (usize, &LineRow<D>)| (row.group, angle(row), slot as u32);
+    let mut bearings: Vec<_> = rows.iter().enumerate().map(bearing).collect();
+    bearings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let n = lists.n_slots();
     let windows: Vec<Option<Window>> =
         (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
@@ -146,13 +148,6 @@ fn sine<const D: usize>(a: &LineRow<D>, b: &LineRow<D>) -> f32 {
 
 /// All bearings as (group, angle, slot), sorted.
 type Bearings = [(u32, f64, u32)];
-
-fn bearings<const D: usize>(rows: &[LineRow<D>]) -> Vec<(u32, f64, u32)> {
-    let bearing = |(slot, row): (usize, &LineRow<D>)| (row.group, angle(row), slot as u32);
-    let mut bearings: Vec<_> = rows.iter().enumerate().map(bearing).collect();
-    bearings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    bearings
-}
 
 /// Returns the fraction of all records that are rays of the anchor of `own` within `sine` of it.
 fn fraction_within<const D: usize>(bearings: &Bearings, own: &LineRow<D>, sine: f32) -> f32 {

@@ -3,8 +3,7 @@
 //! One point per line (Chelani et al., CVPR 2021): lines vote at their closest approach, and those near the peaks vote again. Two points
 //! per line (Lee et al., CVPR 2023): the two highest peaks. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
 //!
-//! The published programs measure votes from the true point and take ranges from true distances. Here votes are measured from
-//! the foot of the line, a line does not vote for itself, and ranges come from the votes.
+//! The published programs use true points and distances. Here votes are measured from the foot, and ranges come from the votes.
 
 use rayon::prelude::*;
 

@@ -269,7 +269,7 @@ struct Crowd<'a, const D: usize> {
 
 impl<'a, const D: usize> Crowd<'a, D> {
     fn new(places: &Places<D>, tree: &'a Knn<'a, D>) -> Self {
-        let order = || tree.leaf_order().iter().map(|&at| at as usize);
+        let order = || tree.rows.iter().map(|&at| at as usize);
         let padded = |of: &dyn Fn(usize) -> f32| -> Vec<f32> {
             order().map(of).chain([0.0; LEAF]).collect()
         };

@@ -91,7 +91,14 @@ fn pairs<const D: usize>(
             row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = odds(i, e));
         });
         let alone = distances.alone();
-        messages = next_messages(&messages, &partners, &weight, |i| alone[class[i]]);
+        let offer = |e: usize| weight[e] * messages[partners.back[e] as usize];
+        messages = partners.column(|i, row| {
+            let alone = alone[class[i]];
+            let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
+            // Rounding must not take it below the weight without any pair.
+            let message = |e: usize| 1.0 / (all - offer(e)).max(alone);
+            row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = message(e));
+        });
         let tallies = by_part(n, |records| {
             let mut tally = vec![[0.0; STEPS]; CLASSES];
             for i in records {
@@ -129,23 +136,6 @@ fn pairs<const D: usize>(
         of_record[record as usize] = mutual.map(|j| order[j as usize]);
     }
     of_record
-}
-
-/// Returns the next messages of all pairs, from the weight of each pair (equal in both directions) and of a record `alone`.
-fn next_messages(
-    messages: &[f32],
-    partners: &Partners,
-    weight: &[f32],
-    alone: impl Fn(usize) -> f32 + Sync,
-) -> Vec<f32> {
-    let offer = |e: usize| weight[e] * messages[partners.back[e] as usize];
-    partners.column(|i, row| {
-        let alone = alone(i);
-        let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
-        // Rounding must not take it below the weight without any pair.
-        let message = |e: usize| 1.0 / (all - offer(e)).max(alone);
-        row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = message(e));
-    })
 }
 
 #[inline(always)]

@@ -8,9 +8,9 @@
 //!    elsewhere is nearly as good, the records that pass near the two decide;
 //! 3. refines the best candidate by weighted least squares.
 //!
-//! `odds_j` are the odds that edge `j` leads to a true neighbor, `p_true` is the density of true neighbors at a distance, and
-//! `p_random` that of the estimates of all slots. They are learned from the current estimates (`neighbor_distribution`, `map::grid`).
-//! `p_range` is the prior over ranges of rays whose center has an image region of its own; it is 1 for other records.
+//! `odds_j` are the odds that edge `j` leads to a true neighbor, `p_true` and `p_random` the densities of true neighbors and of all
+//! estimates (`neighbor_distribution`, `map::grid`). `p_range` is the prior over ranges of rays whose center has an image region of its
+//! own; else 1.
 //!
 //! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
 //! best candidate leads by a clear margin is updated again only if enough neighbors have jumped nearby since the last turn.

@@ -170,8 +170,7 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
 
     /// Returns the bound on the imbalance of forward and reverse edges, in nats; infinite where wrong entries form no clusters.
     ///
-    /// Uniformly wrong entries stand alone. Records with similar descriptors are wrong together: a list with one of them holds
-    /// others beside it, so that their place gathers as much evidence as the right one. But those records do not list back.
+    /// Records with similar descriptors are wrong together: a list with one of them holds others. But they do not list back.
     fn most_imbalance(&self) -> f32 {
         let place = |slot: usize| self.estimates[slot].position;
         let (mut entries, mut companions) = (0.0, 0.0);

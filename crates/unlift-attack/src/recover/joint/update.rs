@@ -45,8 +45,8 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
     type Scratch = Scratch<D>;
     type Output = (Estimate<D>, f32);
 
-    /// Returns the new estimate of `slot`, and its margin: the lead of its place over the best candidate elsewhere in nats, or without such
-    /// a candidate its log-likelihood ratio; 0 if it must be updated again. Without nearby estimates it returns the old estimate and 0.
+    /// Returns the new estimate of `slot`, and its margin: its lead over the best candidate elsewhere in nats; 0 if it must be updated
+    /// again.
     #[inline(always)]
     fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> (Estimate<D>, f32) {
         let old = &self.estimates[slot];

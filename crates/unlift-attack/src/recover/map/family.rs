@@ -67,8 +67,7 @@ pub(crate) trait Family<const D: usize>: Sync {
     const ALONG: f32 = 2.0;
     /// In least squares, an estimate has half weight at this likelihood ratio of a true neighbor against chance.
     const HALF_WEIGHT_RATIO: f32 = 1.0;
-    /// Whether wrong entries of the same region count as background and not as true neighbors: along a line they would draw a place
-    /// into the middle of its region. Planes and candidates keep them, because a neighbor fixes few coordinates and more are better.
+    /// Whether wrong entries of the same region count as background: along a line they would draw a place into the middle of its region.
     const SUBTRACTS_BACKGROUND: bool = false;
     /// Largest radius of the distribution of neighbors, in deltas. Without it, the radius would grow where most estimates are wrong.
     const MOST_RADIUS: f32 = 0.95;
@@ -101,8 +100,7 @@ pub(crate) trait Family<const D: usize>: Sync {
     fn extent(&self) -> f64;
     /// Returns the chance that a random record passes within `delta` of a typical place.
     fn typical_chance(&self, delta: f32) -> f32;
-    /// Returns two limits on chance for maps in which a list holds the fraction `share` of all records: a delta with less chance than
-    /// the first is never too wide, and one with less than the second is too narrow.
+    /// Returns two limits on chance, if a list holds the fraction `share` of all records: of a delta never too wide, and of one too narrow.
     ///
     /// Neighbors then lie in a ball that holds this fraction of the map. A random line passes through it with probability `share^(2/3)` if
     /// points fill space and `share^2` if they lie on a curve; a random plane with `share^(1/3)` and `share`.

@@ -375,8 +375,7 @@ impl Intervals {
         everywhere
     }
 
-    /// Returns the position where the agreement of `sections` is least probable by chance. `limits` are the squared delta, and the range of
-    /// positions. The number of agreeing records is largest at the start of some interval, so only starts are tried.
+    /// Returns the least probable position by chance among the starts of intervals. `limits` are the squared delta and the range.
     ///
     /// `k` listed records may vote. `chances` gets the starts, a buffer for cells, and a column to which it adds the chance that a random
     /// record passes there. The prior is proportional to that chance. The lower record wins ties.
