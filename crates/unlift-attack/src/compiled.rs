@@ -1,7 +1,7 @@
 //! Functions for two and three dimensions that are compiled once, in this crate.
 //!
-//! A function that is generic over the number of dimensions is compiled again in every crate that calls it, and recovery is large. A
-//! pointer to its two versions in a `static` avoids that: [`both!`](crate::both).
+//! A generic function is compiled again in every crate that calls it. A pointer to its versions in a `static` avoids that:
+//! [`both!`](crate::both).
 
 use std::any::Any;
 

@@ -1,7 +1,6 @@
 //! Protected descriptors: affine subspaces, or sets of words, in place of plain descriptors.
 //!
-//! A protected map has no plain descriptor. Sources that compare plain descriptors read the attacker's
-//! [`guess`](ProtectedDescriptors::guess), which is computed from released and public data alone.
+//! Sources that compare plain descriptors read the attacker's [`guess`](ProtectedDescriptors::guess), from released and public data.
 
 use std::sync::{Arc, OnceLock};
 

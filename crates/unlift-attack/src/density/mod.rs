@@ -7,8 +7,7 @@
 //! The expectation spreads each record's point over its feasible line, in proportion to the density. The maximization sums these weights
 //! to the new density and smooths it. Grids go from coarse to fine: a coarse one avoids local optima, a fine one starts from its result.
 //!
-//! A record must not confirm itself. So its own part of the density is subtracted before its point is spread again. Rays use
-//! the density from rays of *other* centers, because rays of one center agree at any distance.
+//! A record's own part of the density is subtracted before its point is spread again. Rays use the density from *other* centers.
 //!
 //! The cost is the number of samples of all lines times rounds. It is linear in the records, with about 1 kB per line on the finest grid.
 
@@ -23,8 +22,7 @@ use feasible::{Feasible, Hides};
 use peaks::find;
 use spread::Spread;
 
-/// The estimate of every slot that has one; by default of none. Its evidence is the logarithm of the likelihood ratio of the place to a
-/// uniformly random one on the record. The two peaks of a paired line are in order along the line, because it is unknown which slot each belongs to.
+/// The estimate of every slot that has one; by default of none. Evidence is against a uniformly random place. Pairs ascend along the line.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Peaks {
     pub(crate) of: Vec<Option<Estimate<3>>>,

@@ -3,8 +3,7 @@
 //! The search tree is a balanced k-d tree. Points are stored leaf by leaf, one column per coordinate, so that a leaf takes a few vector
 //! instructions. The index of a node determines its place in the columns, so only boxes are stored.
 //!
-//! A query first searches the smallest node around its point that holds enough others. The K-th distance found there is an upper bound.
-//! Then it takes every point within that bound, so that no tie is missed.
+//! A query first takes an upper bound from a node around its point that holds enough others, then every point within that bound.
 
 use std::ops::Range;
 
@@ -180,8 +179,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         node - (1 << self.depth)
     }
 
-    /// Calls `take` with the places of every leaf within the squared distance `bound`, except below node `but`; see
-    /// [`lowest`](Self::lowest).
+    /// Calls `take` with the places of every leaf within the squared distance `bound`, except below `but`, by [`lowest`](Self::lowest).
     #[inline(always)]
     fn leaves_within(
         &self,
@@ -217,8 +215,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.boxes[node].low == self.boxes[node].high
     }
 
-    /// Returns the places of a node; of coinciding points only the leaves with the `most` lowest rows, as no others can be among the
-    /// nearest.
+    /// Returns the places of a node; of coinciding points only leaves with the `most` lowest rows, as no others can be among the nearest.
     #[inline(always)]
     fn lowest(&self, node: usize, most: usize) -> Range<usize> {
         let all = self.range(node);
@@ -367,12 +364,12 @@ mod tests {
         let knn = Knn::new(points).unwrap();
         let mut found = Vec::new();
         for k in [1, 7, 50] {
-            let all = knn.per_row(|_| k, |_, found| found.to_vec());
+            let (all, kth) = (knn.per_row(|_| k, |_, found| found.to_vec()), knn.kth_distances(k));
             for (row, point) in points.iter().enumerate() {
                 let expected = brute_force(point, row, k);
-                assert_eq!(all[row], expected, "{row}, k {k}");
+                assert_eq!(kth[row], expected.last().map_or(0.0, |last| last.0.sqrt()));
                 knn.nearest(row, k, &mut found);
-                assert_eq!(found, expected, "{row}, k {k}");
+                assert_eq!([&all[row], &found], [&expected; 2], "{row}, k {k}");
                 if row % 8 == 0 {
                     let query = std::array::from_fn(|c| 0.7 * point[c] + 0.4 * points[row / 2][c]);
                     knn.nearest_to(query, k, &mut found);
@@ -387,11 +384,10 @@ mod tests {
         for n in [2, 23, 24, 25, 48, 49, 97, 300, 1000] {
             let mut draws = Draws::new(n, Stage::Synthetic, 0);
             // Cubing makes the middle a million times denser than the border.
-            let mut points = |_| std::array::from_fn(|_| draws.between(-1.0, 1.0).powi(3) * 1e3);
-            compare(&(0..n).map(&mut points).collect::<Vec<[f64; 3]>>());
-            let flat: Vec<[f64; 2]> =
-                (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
-            compare(&flat);
+            let points = (0..n).map(|_| [0; 3].map(|_| draws.between(-1.0, 1.0).powi(3) * 1e3));
+            let points: Vec<[f64; 3]> = points.collect();
+            compare(&points);
+            compare(&points.iter().map(|p| [p[0], p[1]]).collect::<Vec<[f64; 2]>>());
         }
         // A coarse lattice: most distances tie, many points coincide.
         let mut draws = Draws::new(5, Stage::Synthetic, 0);
@@ -410,19 +406,12 @@ mod tests {
 
     #[test]
     fn points_at_one_place_cost_no_more_than_others() {
+        assert!(Knn::<3>::new(&[]).is_err() && Knn::new(&[[0.0, f64::NAN]]).is_err());
         let points = vec![[1.0; 3]; 200_000];
         let knn = Knn::new(&points).unwrap();
         let sums = knn.per_row(|_| 50, |_, found| found.iter().map(|item| item.1).sum::<u32>());
         assert_eq!(sums[199_999], (0..50).sum::<u32>());
         let mut found = Vec::new();
         (0..points.len()).for_each(|row| knn.nearest(row, 50, &mut found));
-    }
-
-    #[test]
-    fn values_per_row_come_in_the_order_of_rows() {
-        let points = [[0.0, 0.0], [5.0, 0.0], [1.0, 0.0]];
-        let knn = Knn::new(&points).unwrap();
-        assert_eq!(knn.kth_distances(1), [1.0, 4.0, 1.0]);
-        assert!(Knn::<3>::new(&[]).is_err() && Knn::new(&[[0.0, f64::NAN]]).is_err());
     }
 }

@@ -569,17 +569,16 @@ mod tests {
 
     #[test]
     fn few_blocks_all_meet() {
-        let descriptors = crowds(1_500, 128);
+        let of = crowds(1_500, 128);
         const { assert!(1_500 < BLOCK * PARTNERS) };
-        fn scores<L: Likeness>(likeness: &L, of: &Descriptors, exact: usize) -> Vec<f32> {
-            found(likeness, of, 10, exact).concat().into_iter().map(|(score, _)| score).collect()
-        }
-        assert_eq!(scores(&Cosine, &descriptors, 0), scores(&Cosine, &descriptors, MOST_ROWS));
-        let hypotheses = Hypotheses::of(&descriptors).unwrap();
-        assert_eq!(
-            scores(&hypotheses, &descriptors, 0),
-            scores(&hypotheses, &descriptors, MOST_ROWS)
-        );
+        let scores = |found: Vec<Vec<(f32, u32)>>| -> Vec<f32> {
+            found.concat().into_iter().map(|(score, _)| score).collect()
+        };
+        let hypotheses = Hypotheses::of(&of).unwrap();
+        let [some, all] = [0, MOST_ROWS].map(|exact| found(&Cosine, &of, 10, exact));
+        assert_eq!(scores(some), scores(all));
+        let [some, all] = [0, MOST_ROWS].map(|exact| found(&hypotheses, &of, 10, exact));
+        assert_eq!(scores(some), scores(all));
     }
 
     #[test]
@@ -590,11 +589,10 @@ mod tests {
         let right = found(&Cosine, &descriptors, 5, MOST_ROWS);
         let some = found(&Cosine, &descriptors, 5, 0);
         let lists = some.iter().zip(&right);
-        let in_both = lists.map(|(found, right)| {
+        let n_both = |(found, right): (&Vec<(f32, u32)>, &Vec<(f32, u32)>)| {
             right.iter().filter(|right| found.iter().any(|found| found.1 == right.1)).count()
-        });
-        let n_both: usize = in_both.sum();
-        let recall = n_both as f64 / right.iter().map(Vec::len).sum::<usize>() as f64;
+        };
+        let recall = lists.map(n_both).sum::<usize>() as f64 / right.concat().len() as f64;
         assert!(recall >= 0.9, "{recall}");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
         assert_eq!(pool.install(|| found(&Cosine, &descriptors, 5, 0)), some);

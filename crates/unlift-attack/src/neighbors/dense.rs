@@ -17,8 +17,7 @@ const MOST: usize = 1 << 13;
 /// deviations above the mean, averaged over both rows. Mean and deviation are those of a row's best scores over all reaches. Scores are
 /// symmetric; 0 between a descriptor and itself.
 ///
-/// For a part of a larger set, `usual` gives the mean and deviation of each descriptor's scores with all of the larger set
-/// ([`usual`](usual())), because within a part of similar descriptors scores are higher.
+/// For a part of a larger set, whose scores are higher, `usual` gives the mean and deviation in the larger set ([`usual`](usual())).
 ///
 /// # Errors
 /// When there are fewer than two descriptors or more than 8,192, or `usual` has another number of entries.

@@ -21,8 +21,7 @@ const MOST_LOOKED: usize = 64 * LOOK;
 /// Lists, per slot, the `k` records most likely to hide points near its own; none without an estimate. The score is the negative distance
 /// between estimates plus the distance from the estimate to the record (where known), in units of the resolution.
 ///
-/// The slots of a paired line get the lists of its two estimates in their order along the line, because it is unknown which
-/// descriptor belongs to which. Rays list only rays of other centers, because rays of one center are no evidence for each other.
+/// The slots of a paired line get the lists of its two estimates in their order along the line. Rays list only rays of other centers.
 ///
 /// The cost is that of tomography (linear in the records) and of nearest neighbors of points.
 ///

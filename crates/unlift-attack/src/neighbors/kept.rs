@@ -8,8 +8,7 @@ use crate::{About, Descriptors, RecordId};
 
 /// Lists that a source has made from the descriptors of a map alone.
 ///
-/// Schemes with one slot per record release the same descriptors, each in a random order. Sources that read nothing else order rows by
-/// content, so their lists for these maps are equal up to the numbers of records.
+/// Schemes with one slot per record release the same descriptors in random order, so such lists are equal up to the numbers of records.
 #[derive(Clone, Debug)]
 pub struct KeptLists {
     descriptors: Descriptors,

@@ -20,8 +20,7 @@ pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 /// For learned descriptors, which see a large area around their point, it lists the records that a short walk over the most similar
 /// ones reaches. The score is the logarithm of the discounted probability to be reached.
 ///
-/// Subspaces are compared by the [guess](crate::ProtectedDescriptors::guess) of their descriptors, sets of words by the
-/// likelihood that both contain the word of one descriptor.
+/// Subspaces are compared by the [guess](crate::ProtectedDescriptors::guess), sets of words by the likelihood that they contain one word.
 ///
 /// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, similar blocks of descriptors are compared.
 #[derive(Clone, Copy, Debug)]

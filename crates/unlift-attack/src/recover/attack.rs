@@ -72,8 +72,7 @@ fn solve<const D: usize>(
 
 /// Runs our attacks on the records alone; returns the name and result of each. Planes and rays from one center yield nothing.
 ///
-/// They read the whole map, because of a sample less is recovered. The published attack runs on rays only: on lines it recovered less than
-/// tomography on every map (docs/benchmarks.md).
+/// Of a sample, less would be recovered. On lines the published attack recovered less than tomography (docs/benchmarks.md).
 ///
 /// # Errors
 /// When `options` are out of range.

@@ -28,8 +28,8 @@ const LEAST_FOREIGN: f32 = 0.05;
 /// For lines, paired lines, rays, planes and candidates: the constant term of the probability, and that of the scale.
 const OF_KIND: [(f32, f32); 5] =
     [(-3.268, -2.741), (-6.75, -2.546), (-5.78, -2.245), (-6.443, -1.623), (-5.376, -2.314)];
-/// Weights in the logit of the probability, of the logarithms of: near records that the slot lists; that list the slot; the share of near
-/// entries of near slots; this share of the map; the share of near records from other centers.
+/// Weights in the logit of the logarithms of: near listed records; near listers; their share around near slots; that of the map; other
+/// centers.
 const FOUND: [f32; 5] = [2.494, 0.308, -0.608, -1.07, 1.33];
 /// Weights in the logarithm of the scale, of the logarithms of: all near records; the share of near entries of near slots.
 const SCALE: [f32; 2] = [-0.133, -0.675];

@@ -11,8 +11,7 @@ use crate::recover::map::{CHUNK, Family, mixed, trimmed_box};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
-/// Least delta within known bounds, as a fraction of the spacing of points. A fifth of the keypoints of an image coincide with another:
-/// such records agree exactly, so that evidence grows as delta shrinks.
+/// Least delta within known bounds, as a fraction of the spacing of points: coinciding keypoints agree exactly, whatever delta is.
 const LEAST_DELTA: f64 = 0.25;
 /// The bounds along an axis are ignored if they are this many times as long as the range of most points.
 const TOO_LARGE: f64 = 1.5;
@@ -39,8 +38,7 @@ const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 /// If the likely delta of candidates is this many times as wide, it is taken: partners agree exactly, so that evidence hardly falls.
 const COLLAPSED: f64 = 4.0;
 
-/// Chooses delta, in the unit of the map. Consensus reads `used`: lists as `given`, or those of both directions. `sharp` is for joint
-/// recovery.
+/// Chooses delta, in the unit of the map, from lists as `given` and as `used` (in both directions); with `sharp`, for joint recovery.
 pub(super) fn learn<const D: usize, F: Family<D>>(
     released: &Released<D>,
     family: &F,
@@ -52,10 +50,7 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
     if family.anchored().is_some() {
         return ANCHOR_DELTA * spacing;
     }
-    let beyond_edge = match given.scores().is_some() {
-        true => BEYOND_EDGE_OF_SCORED,
-        false => BEYOND_EDGE,
-    };
+    let beyond_edge = given.scores().map_or(BEYOND_EDGE, |_| BEYOND_EDGE_OF_SCORED);
     let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
     let share = per_list / released.n_records().max(1) as f64;
     // The bounds of a map may be far wider than its points, so that the share limits delta.
@@ -90,8 +85,7 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
 }
 
 /// Returns the delta with the best score, at least `least`; `None` for a map without extent. A list holds the fraction `share` of all
-/// records. Of the plateau at the maximum it takes the widest delta; with `beyond_edge`, a narrow one, at most that many times its lower
-/// edge.
+/// records. Of the plateau it takes the widest delta; with `beyond_edge`, a narrow one, at most that many times its lower edge.
 fn choose<const D: usize, F: Family<D>>(
     family: &F,
     (lists, slots_per_record): (&Neighborhoods, usize),
@@ -105,12 +99,9 @@ fn choose<const D: usize, F: Family<D>>(
     // Keep some steps of the ladder between the two limits.
     let too_narrow = narrow.min(too_wide / 8.0);
     // In a flat map two of the three lines of a record run within the plane.
-    let too_wide = match family.radius_if_flat(share) {
-        Some(radius) => too_wide.max(chance(radius)),
-        None => too_wide,
-    };
+    let if_flat = family.radius_if_flat(share).map_or(0.0, chance);
     // If points are sparse, keep at least one halving between the two limits.
-    let too_wide = too_wide.max(chance(2.0 * least));
+    let too_wide = too_wide.max(if_flat).max(chance(2.0 * least));
     let extent = family.extent();
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
@@ -153,10 +144,8 @@ fn choose<const D: usize, F: Family<D>>(
     let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
     let Some(beyond_edge) = beyond_edge else { return Some(high) };
     let across = low * libm::pow(high / low, F::ACROSS);
-    Some(match F::KEEPS_NEAR_EDGE {
-        true => across.min(beyond_edge * edge(coarse, &value).max(least)),
-        false => across,
-    })
+    let near_edge = F::KEEPS_NEAR_EDGE.then(|| beyond_edge * edge(coarse, &value).max(least));
+    Some(near_edge.map_or(across, |near_edge| across.min(near_edge)))
 }
 
 /// Returns the lower edge of the plateau: where evidence begins to fall as delta shrinks below `coarse`, the best of its ladder.

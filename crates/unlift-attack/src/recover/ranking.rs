@@ -9,8 +9,7 @@
 //! The log-likelihood of slot `i` is the sum of `ln P` over its list and over the slots that list its record, and of `ln(1 - P)` over the
 //! others nearby. Each iteration moves even, then odd slots along their records to the likeliest of some places.
 //!
-//! Far estimates are as likely at all places, so only those within a few `R_i` count, and each likelihood is divided by that of a far
-//! estimate. Eight places are scored at a time.
+//! Each likelihood is divided by that of a far estimate, so only those within a few `R_i` count. Eight places are scored at a time.
 
 use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
@@ -62,8 +61,7 @@ const INLIER_RATIO: (f32, f32) = (0.05, 0.98);
 const LEAST_LISTS: f32 = 4.0;
 /// Below this inlier ratio, the estimates of joint recovery are kept: Castle at 0.1 would lose up to 4 points within 1.0.
 const LEAST_RATIO: f32 = 0.15;
-/// The limit for lists with scores: sources leave out near points, too. Lists of SIFT maps (0.2) would lose up to 17 points, those of
-/// ALIKED images (0.9) gain up to 20 (docs/decisions/tried.md).
+/// The limit for lists with scores: sources leave out near points, too (docs/decisions/tried.md).
 const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
 /// Returns the estimates of all slots after ranking from `start`, or `None` if what lists do not name says too little.

@@ -71,8 +71,6 @@ impl<const D: usize> Estimate<D> {
     }
 }
 
-// Confidence.
-
 /// The attacker's confidence in the estimate of one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Confidence {
@@ -93,8 +91,6 @@ impl Confidence {
         if ratio.is_finite() { f64::from(self.found) / (1.0 + ratio * ratio) } else { 0.0 }
     }
 }
-
-// Reasons why confidence is missing.
 
 named! {
     /// Why a recovered map has no [`Confidence`]: in these cases predicted probabilities were wrong or never tested.
@@ -148,8 +144,6 @@ impl Unknown {
         }
     }
 }
-
-// The recovered map.
 
 /// Recovered positions, one row per slot, in columns.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,6 @@
 //! Recovery of keypoints from a sequence of protected queries whose poses are known.
 //!
-//! Each query hides its keypoints on its own. A line seen from a known pose is a plane in space, and three planes meet in the point that
-//! the keypoint shows. Links between queries come from descriptors alone; no lists of neighbors are needed.
+//! A line seen from a known pose is a plane, and three planes meet in a point. Links between queries come from descriptors alone.
 //!
 //! ```text
 //! queries, poses ──Links──> tracks ──triangulate──> points ──project──> positions on the records

@@ -99,8 +99,7 @@ fn section(line: &LineRow<3>, passing: &LineRow<3>) -> (f32, f32, f32) {
     LineRow { group: NO_GROUP, ..*line }.section(passing)
 }
 
-/// Returns the `k` lines that vote with the smallest finite distances (ties by index), unordered, and the largest of these distances, not
-/// squared. `squared` has the distance of every `every`-th line. The line of `row` itself does not vote, nor do rays of its center.
+/// Returns the `k` voting lines with the smallest finite distances, and the largest of these. `squared` has that of every `every`-th line.
 fn nearest(
     squared: Vec<f32>,
     k: usize,

@@ -254,8 +254,7 @@ impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
 /// In a neighborhood (a slot's record and its list), each member votes for the axis with the largest sum of distances to the others. Sums
 /// are divided by their mean: otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
 fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
-    let votes: Vec<[AtomicU32; D]> =
-        rows.iter().map(|_| std::array::from_fn(|_| AtomicU32::new(0))).collect();
+    let votes: Vec<AtomicU32> = (0..D * rows.len()).map(|_| AtomicU32::new(0)).collect();
     (0..lists.n_slots()).into_par_iter().for_each(|slot| {
         let mut members = vec![RecordId::from_index(slot)];
         members.extend_from_slice(lists.of(slot));
@@ -270,14 +269,11 @@ fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
         });
         for (at, member) in members.iter().enumerate() {
             let guess = largest::<D>(|axis| distances[axis][at]);
-            votes[member.index()][usize::from(guess)].fetch_add(1, Ordering::Relaxed);
+            votes[D * member.index() + usize::from(guess)].fetch_add(1, Ordering::Relaxed);
         }
     });
-    let of = |votes: [AtomicU32; D]| {
-        let votes = votes.map(|n| n.into_inner() as f32);
-        largest::<D>(|axis| votes[axis])
-    };
-    votes.into_iter().map(of).collect()
+    let of = |of: &[AtomicU32]| largest::<D>(|axis| of[axis].load(Ordering::Relaxed) as f32);
+    votes.chunks_exact(D).map(of).collect()
 }
 
 /// Returns the axis with the largest value, the lowest of equal ones.

@@ -1,7 +1,6 @@
 //! Beliefs: a few places per slot, each with the probability that it is the right one.
 //!
-//! Lists that a source makes from descriptors are wrong together, because records with similar descriptors list the same records. So the
-//! lists of a slot often support several places. This step starts from the estimates of joint recovery. In an iteration it
+//! Records with similar descriptors list the same records, so that lists of a source often support several places. In an iteration it
 //!
 //! 1. learns, for each class `c` of edges, the likelihood ratio `L_c(u)` of an edge between points at distance `u` against one between
 //!    points that are far apart (`tables`). The unit of `u` is a *width*, about the distance to the 50th nearest estimate
@@ -16,8 +15,7 @@
 //! candidates, it is the density of the values published on the axis that was exchanged. The first iteration moves all slots, the others
 //! one of two random halves in turn.
 //!
-//! The method is belief propagation with particles on the graph of lists, as in the localization of sensor networks (Ihler et al. 2005),
-//! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/tried.md.
+//! It is belief propagation with particles on the graph of lists (Ihler et al. 2005). Figures are in docs/decisions/tried.md.
 
 mod tables;
 mod temper;

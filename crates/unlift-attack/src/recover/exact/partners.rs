@@ -36,8 +36,7 @@ pub(super) struct Partners {
 }
 
 impl Partners {
-    /// Finds pairs of `sides` on one axis, each of whose estimates lies within `reach` of the value that the other published. Uses a shorter
-    /// reach if there are too many pairs. `None` if there are none.
+    /// Finds pairs on one axis whose estimates lie within `reach`, or less if they are too many, of each other's published values.
     pub(super) fn find(sides: &[Side], reach: f32) -> Option<Self> {
         let mut strips = Strips::new(sides, reach);
         let mean = strips.mean();

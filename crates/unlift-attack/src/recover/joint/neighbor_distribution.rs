@@ -39,20 +39,15 @@ pub(super) struct NeighborDistribution {
     pub(super) density_at_zero: f32,
     /// Density of wrong entries that lie in the same region of the map, times the odds of an entry; uniform within the reach.
     pub(super) background: f32,
-    /// Bound on the imbalance of forward and reverse edges, in nats, see [`Near::balanced_log_likelihood`]; infinite where
-    /// wrong entries form no clusters.
-    ///
-    /// [`Near::balanced_log_likelihood`]: super::votes::Near::balanced_log_likelihood
+    /// Bound on the imbalance of forward and reverse edges, in nats; infinite where wrong entries form no clusters.
     pub(super) most_imbalance: f32,
 }
 
 impl NeighborDistribution {
     /// Per class, the odds that one end of an edge is a true neighbor: half of the odds if it leads to two slots.
     pub(super) fn odds_per_end(&self, graph: &Graph) -> [f32; CLASSES] {
-        std::array::from_fn(|class| match graph.is_either(class as u8) {
-            true => 0.5 * self.odds[class],
-            false => self.odds[class],
-        })
+        let share = |class: usize| if graph.is_either(class as u8) { 0.5 } else { 1.0 };
+        std::array::from_fn(|class| share(class) * self.odds[class])
     }
 }
 

@@ -45,8 +45,7 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
     type Scratch = Scratch<D>;
     type Output = (Estimate<D>, f32);
 
-    /// Returns the new estimate of `slot`, and its margin: its lead over the best candidate elsewhere in nats; 0 if it must be updated
-    /// again.
+    /// Returns the new estimate of `slot`, and its margin: the lead over the best candidate elsewhere in nats; 0 to update it again.
     #[inline(always)]
     fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> (Estimate<D>, f32) {
         let old = &self.estimates[slot];

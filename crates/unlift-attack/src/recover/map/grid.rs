@@ -218,11 +218,8 @@ impl<const D: usize> Density<D> {
             *value = value.max(least) * scale;
         }
         let mut densities: Vec<f32> = places.iter().map(|x| grid.at(x)).collect();
-        let middle = densities.len() / 2;
-        let typical = match densities.is_empty() {
-            true => scale,
-            false => *densities.select_nth_unstable_by(middle, f32::total_cmp).1,
-        };
+        densities.sort_unstable_by(f32::total_cmp);
+        let typical = densities.get(densities.len() / 2).copied().unwrap_or(scale);
         Self { grid, typical }
     }
 
@@ -231,8 +228,7 @@ impl<const D: usize> Density<D> {
         self.grid.at(x)
     }
 
-    /// Returns the local stretch: how many times larger the distance to neighbors is than at a typical place, because the density is lower.
-    /// Dense places get 1. The cube root is right in three dimensions; two dimensions use it, too.
+    /// Returns how many times larger the distance to neighbors is than at a typical place (the cube root, also in 2D). Dense places get 1.
     #[inline(always)]
     pub(crate) fn stretch(&self, density: f32) -> f32 {
         let ratio = self.typical / density;
