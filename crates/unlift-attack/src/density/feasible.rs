@@ -22,7 +22,6 @@ pub(crate) enum Hides {
     OnAxis,
 }
 
-#[derive(Debug)]
 pub(crate) struct Feasible {
     pub(crate) hides: Hides,
     /// Lines and rays without an end, `per_record` per record. Rays of one center always meet there, so they are no evidence for each other.

@@ -65,7 +65,7 @@ impl<'a> Spread<'a> {
                 let all = grid.values[voxel];
                 let mine = if subtracts { convolve(own, at, &kernel) } else { 0.0 };
                 let others = (all - mine).max(all * LEAST_OTHERS) * prior;
-                let t = grid.parameter(k);
+                let t = (k as f32 + 0.5) * grid.cell;
                 if line.is_ray() { others * t * t } else { others }
             }));
         }
@@ -188,15 +188,10 @@ impl Grid<3> {
         first..((to / self.cell - 0.5).floor() as i32 + 1).max(first)
     }
 
-    #[inline(always)]
-    pub(super) fn parameter(&self, k: i32) -> f32 {
-        (k as f32 + 0.5) * self.cell
-    }
-
     /// Returns the voxel of step `k` of `line`; `None` outside the box.
     #[inline(always)]
     pub(super) fn voxel(&self, line: &LineRow<3>, k: i32) -> Option<usize> {
-        let t = self.parameter(k);
+        let t = (k as f32 + 0.5) * self.cell;
         let x: [f32; 3] = std::array::from_fn(|c| {
             (line.through[c] + t * line.direction[c] - self.low[c]) / self.cell
         });

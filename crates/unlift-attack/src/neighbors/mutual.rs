@@ -104,23 +104,6 @@ struct Columns {
     second: Vec<f32>,
 }
 
-impl Columns {
-    /// Adds the scores of row `at` with the columns from `column` on. Free of branches, so that it is vectorized.
-    #[inline(always)]
-    fn keep(&mut self, column: usize, scores: &[f32; LANES], at: u32) {
-        let to = column..column + LANES;
-        let (best, first) = (&mut self.at[to.clone()], &mut self.first[to.clone()]);
-        let second = &mut self.second[to];
-        for l in 0..LANES {
-            let (score, old) = (scores[l], first[l]);
-            let low = if score > old { old } else { score };
-            best[l] = if score > old { at } else { best[l] };
-            first[l] = if score > old { score } else { old };
-            second[l] = if low > second[l] { low } else { second[l] };
-        }
-    }
-}
-
 /// Adds the scores of a block to its rows and columns.
 struct Keep<'a> {
     scores: &'a [f32],
@@ -140,9 +123,18 @@ impl Kernel for Keep<'_> {
         for (r, (scores, best)) in scores.chunks_exact(BLOCK).zip(rows).enumerate() {
             let mut top = [f32::NEG_INFINITY; LANES];
             for (c, scores) in scores.as_chunks::<LANES>().0.iter().enumerate() {
-                columns.keep(others.start + c * LANES, scores, (at + r) as u32);
+                let to = others.start + c * LANES..others.start + (c + 1) * LANES;
+                let (nearest, first) =
+                    (&mut columns.at[to.clone()], &mut columns.first[to.clone()]);
+                let second = &mut columns.second[to];
+                // Free of branches, so that it is vectorized.
                 for l in 0..LANES {
-                    top[l] = if scores[l] > top[l] { scores[l] } else { top[l] };
+                    let (score, old) = (scores[l], first[l]);
+                    let low = if score > old { old } else { score };
+                    nearest[l] = if score > old { (at + r) as u32 } else { nearest[l] };
+                    first[l] = if score > old { score } else { old };
+                    second[l] = if low > second[l] { low } else { second[l] };
+                    top[l] = if score > top[l] { score } else { top[l] };
                 }
             }
             // Few blocks have one of the two nearest of a row.

@@ -287,7 +287,6 @@ pub struct Pair {
 }
 
 /// All hypotheses. Patches are compared by their best one.
-#[derive(Clone, Debug)]
 pub struct Hypotheses {
     pub cells: Vec<Cell>,
     /// Versions of the patch that is turned and shifted.

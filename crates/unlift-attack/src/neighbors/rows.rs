@@ -35,7 +35,6 @@ pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
 }
 
 /// Descriptor rows sorted by content: permuting the records of a released map permutes its lists, except for equal rows.
-#[derive(Debug)]
 pub struct Rows<'a> {
     /// All descriptors, by slot, as they are compared.
     pub descriptors: Cow<'a, Descriptors>,

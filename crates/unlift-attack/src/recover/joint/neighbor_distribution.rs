@@ -27,7 +27,6 @@ const TAIL: f64 = 0.1;
 const FRACTION: (f64, f64) = (5e-4, 0.95);
 
 /// The learned distribution of true neighbors. Lengths are divided by the local stretch, [`Density::stretch`].
-#[derive(Clone, Debug)]
 pub(super) struct NeighborDistribution {
     /// Radius that holds half of the true neighbors' estimates.
     pub(super) radius: f32,

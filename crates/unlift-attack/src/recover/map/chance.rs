@@ -17,7 +17,6 @@ pub(crate) const CELLS: usize = 1 << 15;
 /// Least density, as a fraction of the mean: with chance near 0, a single vote would decide.
 const FLOOR: f32 = 0.05;
 
-#[derive(Clone, Debug)]
 pub(crate) struct ChanceField<const D: usize> {
     pub(crate) grid: Grid<D>,
 }

@@ -62,7 +62,6 @@ fn class_of(lists: &Neighborhoods, bounds: &[f32], side: Side, slot: usize, at: 
     (side as usize * SCORE_CLASSES + lists.scores().map_or(0, class)) as u8
 }
 
-#[derive(Debug)]
 pub(crate) struct Listers {
     offsets: Vec<usize>,
     slots: Vec<u32>,
@@ -93,7 +92,6 @@ impl Listers {
 }
 
 /// Edges per slot, in order of their ends, with the class of each.
-#[derive(Debug)]
 pub(crate) struct Graph {
     offsets: Vec<u64>,
     /// Slots; the first slot of a record if the edge does not specify which.
