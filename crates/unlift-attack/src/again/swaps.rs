@@ -1,8 +1,8 @@
 //! Points whose coordinates were swapped in two releases.
 //!
-//! The two records of a point agree except in the swapped coordinates. If these are of two axes, which one the point has is the same
-//! question for the partner of the swap. Where a point was swapped along one axis in both releases, points share values in a cycle
-//! (docs/decisions/again.md). So one answer decides many; the others go where points are denser.
+//! The two records of a point agree except in the swapped coordinates. Which of two swapped axes the point has is the same question for its
+//! partner, and cycles of shared values link points (docs/decisions/again.md). So one answer decides many; the others go where points are
+//! denser.
 
 use super::Place;
 use crate::geometry::knn::Knn;

@@ -588,11 +588,10 @@ mod tests {
         assert!(n_blocks > 3 * PARTNERS, "a third of the blocks");
         let right = found(&Cosine, &descriptors, 5, MOST_ROWS);
         let some = found(&Cosine, &descriptors, 5, 0);
-        let lists = some.iter().zip(&right);
-        let n_both = |(found, right): (&Vec<(f32, u32)>, &Vec<(f32, u32)>)| {
-            right.iter().filter(|right| found.iter().any(|found| found.1 == right.1)).count()
-        };
-        let recall = lists.map(n_both).sum::<usize>() as f64 / right.concat().len() as f64;
+        let is_found = |at: usize, slot: u32| some[at].iter().any(|found| found.1 == slot);
+        let n_both = |at: usize| right[at].iter().filter(|right| is_found(at, right.1)).count();
+        let n_all = right.concat().len();
+        let recall = (0..right.len()).map(n_both).sum::<usize>() as f64 / n_all as f64;
         assert!(recall >= 0.9, "{recall}");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
         assert_eq!(pool.install(|| found(&Cosine, &descriptors, 5, 0)), some);

@@ -194,15 +194,12 @@ impl<const D: usize> Attack<'_, D> {
         };
         let mut recovered = Recovered::new(released, lists, &estimates, delta)?;
         recovered.trials = trials;
-        let predicted = match &graph {
+        recovered.confidence = match &graph {
             None => Err(Unknown::OtherSolver),
             Some(_) if !self.options.confidence => Err(Unknown::NotAsked),
             Some(graph) => confidence::predict(released, lists, graph, &estimates),
         };
-        match predicted {
-            Ok(confidence) => recovered.with_confidence(confidence),
-            Err(unknown) => Ok(recovered.without_confidence(unknown)),
-        }
+        Ok(recovered)
     }
 }
 

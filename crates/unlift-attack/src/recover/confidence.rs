@@ -1,8 +1,7 @@
 //! Confidence: the probability that an estimate is right, without ground truth.
 //!
-//! Around a right estimate, many of the records that the slot lists are near, and many of those that list the slot. A logistic model turns
-//! their numbers into a probability, and two of them into the scale of the error. Its constants were fitted on synthetic maps only
-//! (docs/decisions/attack.md).
+//! Around a right estimate, many records that the slot lists are near, and many that list it. A logistic model turns their numbers into a
+//! probability and a scale of the error. It was fitted on synthetic maps only (docs/decisions/attack.md).
 
 use rayon::prelude::*;
 

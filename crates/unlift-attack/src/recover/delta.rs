@@ -1,8 +1,7 @@
 //! The automatic choice of delta: the length at which consensus agrees least probably by chance.
 //!
-//! Consensus solves a sample of slots for a geometric ladder of deltas. The score of a delta is the mean evidence minus that of the same
-//! slots with mixed lists, made of entries of other slots' lists: both contain the effects of the number of places tried and of uneven
-//! density.
+//! Consensus solves a sample of slots for a geometric ladder of deltas. The score of a delta is the mean evidence minus that with mixed
+//! lists, made of other slots' entries, which contains the effect of uneven density, too.
 
 use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;

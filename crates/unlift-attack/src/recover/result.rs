@@ -37,10 +37,8 @@ pub struct Estimate<const D: usize> {
     pub position: [f32; D],
     /// Whether the slot was recovered, or why not.
     pub status: Status,
-    /// Number of records that agree with the position. Consensus: listed records within delta before the last refit (planes: within
-    /// 1.5 delta, summed over the free axes). Joint recovery: records at the ends of the slot's edges with an estimate nearby.
-    /// Later steps move the position only.
-    /// The largest count is 65,535.
+    /// Number of records that agree with the position, at most 65,535. Consensus: listed records within delta before the last refit
+    /// (planes: within 1.5 delta, summed over the free axes). Joint recovery: records at the ends of edges with an estimate nearby.
     pub support: u16,
     /// Axis of the hidden coordinate (axis candidates; else 0).
     pub axis: u8,
@@ -157,7 +155,7 @@ pub struct Recovered<const D: usize> {
     evidence: Vec<f32>,
     axis: Option<Vec<u8>>,
     descriptor_row: Option<Vec<u32>>,
-    confidence: Result<Vec<Confidence>, Unknown>,
+    pub(super) confidence: Result<Vec<Confidence>, Unknown>,
     pub(super) trials: Option<Vec<(u32, u64)>>,
     about: About,
 }

@@ -1,8 +1,7 @@
 //! The sampling loop of the paper (section 4), for comparison.
 //!
-//! Each trial draws a few listed records and computes their least-squares position, Eq. (4). That with the largest support is refined. The
-//! number of trials follows the largest support so far (draws without replacement, 99 % confidence). The paper does not give the sample
-//! size: here it is two records per unknown coordinate.
+//! Each trial draws two listed records per unknown coordinate and computes their least-squares position, Eq. (4). The number of trials
+//! follows the largest support so far (draws without replacement, 99 % confidence).
 
 use std::sync::atomic::{AtomicU32, Ordering};
 

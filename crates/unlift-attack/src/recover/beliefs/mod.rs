@@ -11,9 +11,8 @@
 //!    in images without the density;
 //! 4. refines the best place, and keeps the best ones with weights proportional to `exp(score)`.
 //!
-//! The density counts the places of other slots within a width. The volume element is `range^2` for rays, which diverge; for axis
-//! candidates, it is the density of the values published on the axis that was exchanged. The first iteration moves all slots, the others
-//! one of two random halves in turn.
+//! The volume element is `range^2` for rays; for axis candidates, it is the density of the values published on the axis that was exchanged.
+//! The first iteration moves all slots, the others one of two random halves in turn.
 //!
 //! It is belief propagation with particles on the graph of lists (Ihler et al. 2005). Figures are in docs/decisions/tried.md.
 

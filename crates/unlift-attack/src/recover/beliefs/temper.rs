@@ -1,8 +1,7 @@
 //! The temper, learned from each slot's own record.
 //!
-//! The lists of a slot say where its point is, in space. Its record says so independently: a wrong place is near the record by chance
-//! only. So the temper is the exponent under which the lists, without the record, predict best where the record passes. Entries that
-//! are wrong together make it small; for the independent errors of the oracle it is larger.
+//! The lists of a slot say where its point is, and its record says so independently. So the temper is the exponent under which the lists,
+//! without the record, predict best where the record passes. Entries that are wrong together make it small.
 
 use rayon::prelude::*;
 

@@ -1,8 +1,7 @@
 //! Exact constraints on exchanged coordinates: each of two records publishes the hidden coordinate of the other.
 //!
-//! A pair of partners must explain two estimates: each lies near the value that the other record published. The distribution of these
-//! distances is learned together with the probabilities of pairs (expectation maximization). Every record is in at most one pair, so these
-//! come from belief propagation on the monomer-dimer model, with one pass per round.
+//! Each of two partners' estimates lies near the value that the other published. The distribution of these distances is learned together
+//! with the probabilities of pairs (expectation maximization), by belief propagation on the monomer-dimer model.
 
 mod partners;
 

@@ -9,8 +9,7 @@
 //! 3. refines the best candidate by weighted least squares.
 //!
 //! `odds_j` are the odds that edge `j` leads to a true neighbor, `p_true` and `p_random` the densities of true neighbors and of all
-//! estimates (`neighbor_distribution`, `map::grid`). `p_range` is the prior over ranges of rays whose center has an image region of its
-//! own; else 1.
+//! estimates. `p_range` is the prior over ranges of rays whose center has an image region of its own; else 1.
 //!
 //! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
 //! best candidate leads by a clear margin is updated again only if enough neighbors have jumped nearby since the last turn.
