@@ -52,7 +52,6 @@ impl Descriptors {
         }
     }
 
-    /// Creates a matrix from values that are known to be finite and to fill its rows.
     pub(crate) fn unchecked(values: Values, dim: usize) -> Self {
         Self { values, dim }
     }

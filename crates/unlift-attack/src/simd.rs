@@ -149,7 +149,6 @@ fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
     }
 }
 
-/// The version of [`raise_to_products`] for AVX-512 with VNNI, where one instruction does 64 multiplications.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vnni")]
 fn raise_vnni(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {

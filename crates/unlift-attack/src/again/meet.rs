@@ -90,7 +90,6 @@ pub(super) fn search(lines: &[Line], per_record: usize, others: &[Line]) -> Vec<
     lines.par_chunks(per_record).enumerate().map(of_record).collect()
 }
 
-/// Returns points and directions in columns, filled up with lines that pass far away.
 fn columns(lines: &[Line]) -> [Vec<f64>; 6] {
     std::array::from_fn(|c| {
         let value = |line: &Line| if c < 3 { line.point[c] } else { line.direction[c - 3] };

@@ -238,7 +238,6 @@ struct Linked {
     place: Place,
     /// Distance between the records in units of the usual one of wrong pairs; `None` if all such records meet.
     unusual: Option<f64>,
-    /// Probability of the link by its descriptors, where records say nothing.
     by_descriptor: f64,
 }
 

@@ -141,7 +141,6 @@ fn nearest(line: &LineRow<3>, x: &[f64; 3]) -> [f64; 3] {
 /// Number of values to either side over which the density of published values is measured.
 const REACH: usize = 50;
 
-/// Returns, per axis and record, the density of the published values of that axis around the record's value.
 fn value_densities(candidates: &AxisCandidates<3>) -> [Vec<f32>; 3] {
     let n = candidates.position().len();
     std::array::from_fn(|axis| {

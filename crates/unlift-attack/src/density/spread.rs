@@ -13,7 +13,6 @@ const ROUNDS: usize = 4;
 /// Least density that a record sees after its own part is subtracted, as a fraction of the density.
 const LEAST_OTHERS: f32 = 1e-4;
 
-/// The weights of every record's point along its lines, and the density that results.
 pub(super) struct Spread<'a> {
     pub(super) feasible: &'a Feasible,
     pub(super) grid: Grid<3>,

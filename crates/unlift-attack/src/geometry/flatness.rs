@@ -6,7 +6,6 @@ use super::vector::{dot, quantile, quantile_of};
 
 /// Fraction of the points that decide the thickness; the rest may be outliers.
 const KEPT: f64 = 0.9;
-/// Largest number of steps that search the thinnest direction among the kept points.
 const STEPS: usize = 8;
 
 /// Returns the smallest extent of `points` divided by the largest one: 0 on a plane or a line, near 1 in a ball. Extents are those of the

@@ -320,7 +320,6 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
 }
 
 impl<const D: usize> Search<'_, '_, D> {
-    /// Appends the points at `places` within the squared distance `bound`.
     #[inline(always)]
     fn take(&mut self, places: Range<usize>, bound: f64) {
         let mut at = places.start;

@@ -15,7 +15,6 @@ use crate::{Descriptors, Error};
 /// Largest number of rows of which all pairs are compared; this takes minutes on two cores. Of more rows, similar blocks are compared.
 pub const MOST_ROWS: usize = 1 << 17;
 
-/// Returns the note about inexact search for a source with this `name`, if there are too many slots.
 pub fn note(name: &str, n_slots: usize) -> Option<String> {
     (n_slots > MOST_ROWS).then(|| {
         format!(
@@ -28,7 +27,6 @@ pub fn note(name: &str, n_slots: usize) -> Option<String> {
 /// Rows from which typical scores are computed, if not all pairs are compared.
 const USUAL: usize = 16 * BLOCK;
 
-/// Number of blocks that each block of a large map is compared with.
 const PARTNERS: usize = 64;
 
 /// A similarity of two descriptors. The score of a pair does not depend on its order.

@@ -332,7 +332,6 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         }
     }
 
-    /// Tries the places of `slot` that are near the estimates of listed records.
     #[inline(never)]
     fn try_elsewhere(&self, slot: usize, best: &mut Candidate<D>, terms: &mut Terms<D>) {
         let Problem { family, lists, graph, seed, .. } = self.problem;

@@ -230,7 +230,6 @@ impl<const D: usize> Recovered<D> {
         Ok(recovered.without_confidence(Unknown::OtherSolver))
     }
 
-    /// Creates the result of an attack on `released` with `lists`, from one estimate per slot.
     pub(crate) fn new(
         released: &Released<D>,
         lists: &Neighborhoods,
@@ -329,7 +328,6 @@ impl<const D: usize> Recovered<D> {
         self.confidence().map(|rows| rows[slot].probability_within(threshold))
     }
 
-    /// Returns the estimate of `slot` if it is more likely right than wrong.
     pub(crate) fn sure_estimate(&self, slot: usize) -> Option<Estimate<D>> {
         let found = self.confidence()?.get(slot)?.found;
         let axis = self.axis().map_or(0, |axis| axis[slot].into());

@@ -148,7 +148,6 @@ fn cost(sights: &[Sight], x: &[f64; 3], noise_px: f64) -> f64 {
     sights.iter().map(of).sum()
 }
 
-/// Returns the point where three planes meet, unless two are nearly parallel.
 fn meet(a: &Plane, b: &Plane, c: &Plane) -> Option<[f64; 3]> {
     let normal = |p: &Plane| [p[0], p[1], p[2]];
     solve([normal(a), normal(b), normal(c)], [-a[3], -b[3], -c[3]])
