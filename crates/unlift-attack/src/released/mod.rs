@@ -137,10 +137,7 @@ impl<const D: usize> Released<D> {
     pub fn with_bounds(self, bounds: Option<Bounds<D>>) -> Self {
         let known = self.bounds.is_some() || bounds.is_some();
         let bounded = Self { bounds, ..self };
-        match known {
-            true => Self { fingerprint: bounded.hashed(), ..bounded },
-            false => bounded,
-        }
+        if known { Self { fingerprint: bounded.hashed(), ..bounded } } else { bounded }
     }
 
     /// The box that contains all hidden points, in the map's frame, if it is known.

@@ -35,11 +35,6 @@ pub struct Query {
 }
 
 impl Query {
-    /// Whether both cameras look in similar directions, so that they can match.
-    fn looks_like(&self, other: &Self) -> bool {
-        dot(&self.camera.pose.rotation[2], &other.camera.pose.rotation[2]) > TURNED
-    }
-
     fn sight(&self, projection: [[f64; 4]; 3], slot: usize) -> Sight {
         let (records, origin) = (self.released.obfuscation(), self.released.origin());
         let record = slot / self.released.slots_per_record();
@@ -257,9 +252,10 @@ impl Links {
         }
         let described = comparable(&described);
         let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();
+        let toward = |query: usize| &queries[query].camera.pose.rotation[2];
         let pairs: Vec<(usize, usize)> = (0..queries.len())
             .flat_map(|a| (a + 1..queries.len().min(a + reach)).map(move |b| (a, b)))
-            .filter(|&(a, b)| queries[a].looks_like(&queries[b]))
+            .filter(|&(a, b)| dot(toward(a), toward(b)) > TURNED)
             .collect();
         let of_pair = |&(a, b): &(usize, usize)| mutual(&blocks[a], &blocks[b]);
         let found: Vec<_> = pairs.par_iter().with_max_len(1).map(of_pair).collect();

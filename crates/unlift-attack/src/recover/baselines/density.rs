@@ -39,10 +39,8 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Option<Peaks>
         let misses = lines.iter().step_by(every).map(|line| section(&lines[row], line).1);
         let (near, reach) = nearest(misses.collect(), k, (lines, row), every);
         let mut votes = passes(&lines[row], near.iter().map(|&at| &lines[at]));
-        let modes = match is_paired {
-            true => two_modes(&mut votes),
-            false => mode(&mut votes).map(|t| [t; 2]),
-        };
+        let one = |votes: &mut [f64]| mode(votes).map(|t| [t; 2]);
+        let modes = if is_paired { two_modes(&mut votes) } else { one(&mut votes) };
         (modes.map_or([None; 2], |modes| modes.map(|t| on(&lines[row], t))), reach)
     };
     let rows: Vec<([Option<Estimate<3>>; 2], f32)> =

@@ -446,10 +446,8 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         }
         let evidence = self.temper * (sum + ln(product));
         let own = self.problem.family.piece(slot, piece);
-        let range2 = match own.from_center {
-            true => distance2(&own.through, x) / (self.places.typical * self.places.typical),
-            false => 1.0,
-        };
+        let typical2 = self.places.typical * self.places.typical;
+        let range2 = if own.from_center { distance2(&own.through, x) / typical2 } else { 1.0 };
         // Keypoints lie all over an image: their density says nothing.
         let density = if D == 2 {
             0.0

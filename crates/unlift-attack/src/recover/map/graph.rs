@@ -27,7 +27,6 @@ const SCORES: usize = 1 << 16;
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 /// Largest number of reverse edges of a slot, in mean list lengths: a record in very many lists is in most of them by mistake.
 const MOST_REVERSE: usize = 3;
-const PART: usize = 1 << 12;
 
 /// Returns the record of a slot. Records have one or two slots, so a shift replaces a division.
 #[inline(always)]
@@ -107,13 +106,13 @@ impl Graph {
         let listers = Listers::new(lists, n_slots / slots_per_record);
         let bounds = &score_bounds(lists);
         let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
-        let edges = |slot: usize, edges: &mut (Vec<u32>, Vec<u8>)| {
-            let mut put = |end: u32, class: u8| {
-                edges.0.push(end);
-                edges.1.push(class);
-            };
+        let edges = |slot: usize| {
+            let mut edges: Vec<(u32, u8)> = Vec::new();
             let list = lists.of(slot);
-            let own = |side: Side, at: usize| class_of(lists, bounds, side, slot, at);
+            let own = |side: Side, at: usize| {
+                let end = list[at].0 * slots_per_record as u32;
+                (end, class_of(lists, bounds, side, slot, at))
+            };
             let record = record_of(slot, slots_per_record);
             let all = listers.of(record);
             let (mut at, mut mutual) = (0, u32::MAX);
@@ -121,40 +120,29 @@ impl Graph {
             for &by in all.iter().step_by(all.len().div_ceil(most).max(1)) {
                 let theirs = record_of(by as usize, slots_per_record) as u32;
                 while at < list.len() && list[at].0 < theirs {
-                    put(list[at].0 * slots_per_record as u32, own(Side::Forward, at));
+                    edges.push(own(Side::Forward, at));
                     at += 1;
                 }
                 if at < list.len() && list[at].0 == theirs {
-                    put(theirs * slots_per_record as u32, own(Side::Mutual, at));
+                    edges.push(own(Side::Mutual, at));
                     at += 1;
                     mutual = theirs;
                 } else if mutual != theirs {
                     // If a record is mutual already, its other slot adds nothing.
                     let entry = lists.of(by as usize).partition_point(|r| r.index() < record);
-                    put(by, class_of(lists, bounds, Side::Reverse, by as usize, entry));
+                    edges.push((by, class_of(lists, bounds, Side::Reverse, by as usize, entry)));
                 }
             }
-            for (at, entry) in list.iter().enumerate().skip(at) {
-                put(entry.0 * slots_per_record as u32, own(Side::Forward, at));
-            }
-            edges.0.len() as u64
+            edges.extend((at..list.len()).map(|at| own(Side::Forward, at)));
+            edges
         };
-        let slots: Vec<usize> = (0..n_slots).step_by(PART).collect();
-        let parts: Vec<_> = slots
-            .into_par_iter()
-            .map(|first| {
-                let mut part = (Vec::new(), Vec::new());
-                let slots = first..(first + PART).min(n_slots);
-                let until: Vec<u64> = slots.map(|slot| edges(slot, &mut part)).collect();
-                (until, part)
-            })
-            .collect();
-        let (mut offsets, mut ends, mut class) = (vec![0], Vec::new(), Vec::new());
-        for (until, (part, classes)) in parts {
-            offsets.extend(until.iter().map(|until| ends.len() as u64 + until));
-            ends.extend(part);
-            class.extend(classes);
-        }
+        let rows: Vec<Vec<(u32, u8)>> = (0..n_slots).into_par_iter().map(edges).collect();
+        let mut offsets = vec![0];
+        offsets.extend(rows.iter().scan(0, |end, row| {
+            *end += row.len() as u64;
+            Some(*end)
+        }));
+        let (ends, class) = rows.into_iter().flatten().unzip();
         Self { offsets, ends, class, slots_per_record, listers }
     }
 
@@ -266,7 +254,7 @@ mod tests {
     #[test]
     fn edges_are_those_computed_one_by_one() {
         for per in [1, 2] {
-            let lists = lists(2 * PART + 77, per);
+            let lists = lists(2_000, per);
             let on = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| Graph::new(&lists, per))

@@ -195,10 +195,9 @@ impl<const D: usize> Density<D> {
         let (low, high) = trimmed_box(&places);
         let (cell, most) = (radius * CELL, (4 * n).max(1 << 16));
         let side = |c: usize| f64::from((high[c] - low[c]) / cell).ceil().max(1.0);
-        let mut grid = match (0..D).map(side).product::<f64>() <= most as f64 {
-            true => Grid::of_cells(low, high, cell),
-            false => Grid::over(low, high, most),
-        };
+        let fits = (0..D).map(side).product::<f64>() <= most as f64;
+        let mut grid =
+            if fits { Grid::of_cells(low, high, cell) } else { Grid::over(low, high, most) };
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
         for (slot, estimate) in estimates.iter().enumerate() {
