@@ -1,14 +1,12 @@
 //! The released map and the row order of lists and positions.
 //!
-//! Both travel with the data from a source of neighborhoods to the evaluation, so that positions are not compared with the truth of
-//! another map or in another order.
+//! They travel with the data up to the evaluation, so that positions are not compared with the truth of another map or order.
 
 use std::fmt;
 
 use crate::Error;
 
-/// The hash of a released map. It depends on the content of the map alone, and reveals nothing else. See
-/// [`Released::fingerprint`](crate::released::Released::fingerprint).
+/// The hash of a released map, see [`Released::fingerprint`](crate::released::Released::fingerprint).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Fingerprint(pub [u8; 16]);
 
@@ -81,8 +79,7 @@ pub struct About {
     pub map: Option<Fingerprint>,
     /// The order of rows.
     pub order: RowOrder,
-    /// Whether the lists are stated to be the oracle's: true neighbors, and wrong ones drawn at random. It decides the kind of their
-    /// errors.
+    /// Whether the lists are stated to be the oracle's: true neighbors, and wrong ones drawn at random.
     pub by_oracle: bool,
 }
 

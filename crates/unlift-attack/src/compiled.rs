@@ -1,14 +1,13 @@
 //! Functions for two and three dimensions that are compiled once, in this crate.
 //!
-//! A function that is generic over the number of dimensions is compiled again in every crate that calls it, and recovery is large. A
-//! pointer to its two versions in a `static` avoids that: [`both!`](crate::both).
+//! A generic function is compiled again in every crate that calls it. A pointer to its versions in a `static` avoids that:
+//! [`both!`](crate::both).
 
 use std::any::Any;
 
 use crate::Error;
 
-/// Declares a [`Both`] of the two versions of a function: a `static`, which compiles them in this crate. Unit tests call neither, so there
-/// it is a constant, which compiles nothing.
+/// Declares a [`Both`] of the two versions of a function: a `static`, which compiles them in this crate; in unit tests a constant.
 #[macro_export]
 macro_rules! both {
     ($name:ident: $type:ident = $function:ident) => {

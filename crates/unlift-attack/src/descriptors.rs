@@ -28,9 +28,9 @@ impl Descriptors {
     /// When `dim` is 0, above 65,536 or does not divide the number of values, a float is not finite, or the matrix has no information: it is
     /// all zero, or all rows are equal (some exporters write such dummies).
     pub fn try_new(values: Values, dim: usize) -> Result<Self, Error> {
-        let len = match &values {
-            Values::U8(v) => v.len(),
-            Values::F32(v) => v.len(),
+        let (len, dummies) = match &values {
+            Values::U8(v) => (v.len(), dummies(v, dim)),
+            Values::F32(v) => (v.len(), dummies(v, dim)),
         };
         if dim == 0 || !len.is_multiple_of(dim) {
             let expected = format!("a multiple of the dimension {dim}");
@@ -46,17 +46,12 @@ impl Descriptors {
             let what = format!("descriptor {}, value {}", at / dim, at % dim);
             return Err(Error::new(what, "a finite value", v[at]));
         }
-        let dummies = match &values {
-            Values::U8(v) => dummies(v, dim),
-            Values::F32(v) => dummies(v, dim),
-        };
         match dummies {
             Some(found) => Err(Error::new("descriptors", "real descriptors", found)),
             None => Ok(Self { values, dim }),
         }
     }
 
-    /// Creates a matrix from values that are known to be finite and to fill its rows.
     pub(crate) fn unchecked(values: Values, dim: usize) -> Self {
         Self { values, dim }
     }
@@ -113,14 +108,12 @@ impl Descriptors {
         }
     }
 
-    /// Returns row `at`.
     pub(crate) fn row(&self, at: usize) -> Vec<f32> {
         let mut row = vec![0.0; self.dim];
         self.read_row(at, &mut row);
         row
     }
 
-    /// Returns all rows.
     pub(crate) fn rows(&self) -> impl Iterator<Item = Vec<f32>> {
         (0..self.len()).map(|at| self.row(at))
     }
@@ -150,6 +143,7 @@ fn dummies<T: Default + PartialEq>(values: &[T], dim: usize) -> Option<&'static 
     if !values.is_empty() && values.iter().all(|x| *x == T::default()) {
         return Some("only zeros (dummies)");
     }
-    let is_constant = values.len() > dim && values.chunks(dim).all(|row| *row == values[..dim]);
+    let (first, others) = values.split_at(dim.min(values.len()));
+    let is_constant = !others.is_empty() && others.chunks(dim.max(1)).all(|row| row == first);
     is_constant.then_some("the same row for every point (dummies)")
 }

@@ -1,7 +1,6 @@
 //! Protected descriptors: affine subspaces, or sets of words, in place of plain descriptors.
 //!
-//! A protected map has no plain descriptor. Sources that compare plain descriptors read the attacker's
-//! [`guess`](ProtectedDescriptors::guess), which is computed from released and public data alone.
+//! Sources that compare plain descriptors read the attacker's [`guess`](ProtectedDescriptors::guess), from released and public data.
 
 use std::sync::{Arc, OnceLock};
 
@@ -153,18 +152,15 @@ impl ProtectedDescriptors {
         Self { rule: self.rule, rows, public, bytes: self.bytes, guess: OnceLock::new() }
     }
 
-    /// Returns the similarity of every row to a plain unit-length descriptor: 1 minus half of the squared distance to the subspace, or
-    /// the largest cosine with a word of the set. Both are at most 1, as a cosine.
+    /// Returns the similarity of every row to a unit-length descriptor: 1 minus half of the squared distance, or the largest cosine.
     pub fn similarities(&self, plain: &[f32]) -> Vec<f32> {
         simd::dispatch(Similarities { protected: self, plain })
     }
 
-    /// Returns the plain descriptors that an attacker infers, in the scale of the plain ones. A row is one point of its subspace, or the
-    /// mean of its words.
+    /// Returns the plain descriptors that an attacker infers, in their scale: one point of each subspace, or the mean of the words.
     ///
-    /// A subspace intersects the unit sphere in a sphere around its foot. Public descriptors on it, at distance 0, are adversarial
-    /// directions; they are excluded, and the point opposite to them is the guess. Without such, the guess is the foot: random
-    /// directions are nearly orthogonal to the descriptor, which is therefore nearly the point nearest to the origin.
+    /// A subspace intersects the unit sphere in a sphere around its foot. Public descriptors on it are adversarial directions, and the
+    /// point opposite to them is the guess. Without such, the guess is the foot: random directions are nearly orthogonal to the descriptor.
     pub fn guess(&self) -> &Descriptors {
         self.guess.get_or_init(|| {
             let dim = self.dim();

@@ -1,12 +1,10 @@
 //! Vector instructions, chosen at run time. This is the only module with `unsafe`.
 //!
-//! A [`Kernel`] is plain scalar code, compiled twice: for the portable baseline and for AVX2. The compiler vectorizes both. It never
-//! fuses or reorders floating-point operations, so both give the same bits; tests compare them.
+//! A [`Kernel`] is scalar code, vectorized by the compiler for the baseline and for AVX2. Both give the same bits; tests compare them.
 
 #![allow(unsafe_code)]
 
-/// A loop to be compiled for several instruction sets. Implementations, and everything they call in the hot path, are
-/// `#[inline(always)]`: only inlined code gets the instruction set.
+/// A loop for several instruction sets. Implementations, and all that they call in the hot path, are `#[inline(always)]`.
 pub trait Kernel {
     /// What the loop returns.
     type Output;
@@ -34,8 +32,7 @@ fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
 
-/// Prefetches `row[at]`, where the machine has an instruction for that. So the records of the next slot are loaded while the current slot
-/// is solved. It changes no result.
+/// Prefetches `row[at]`, where the machine has an instruction for that. It changes no result.
 #[inline(always)]
 pub(crate) fn prefetch<T>(rows: &[T], at: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -59,8 +56,7 @@ const QUAD: usize = 4;
 /// Raises `best[i][j]` to the product of row `i` of `left` with column `j` of `right`.
 ///
 /// `left` has [`BLOCK`] rows of `depth` values. `right` has [`BLOCK`] columns of `depth` values, each at the index that [`packed`] returns.
-/// `best` is `(BLOCK, BLOCK)`, row-major. Sums of integers do not depend on their order. Intrinsics are used because two AVX2
-/// instructions do 32 multiplications here, and one of AVX-512 does 64, far more than vectorized loops.
+/// `best` is `(BLOCK, BLOCK)`, row-major. Intrinsics do up to 64 multiplications at once, far more than vectorized loops.
 ///
 /// Values are at most 127, and no product of two rows may exceed `i16::MAX`, which rows of Euclidean norm below 181 never do.
 ///
@@ -91,7 +87,6 @@ pub(crate) fn packed(column: usize, at: usize, depth: usize) -> usize {
     panel + (at / QUAD) * PANEL * QUAD + (column % PANEL) * QUAD + at % QUAD
 }
 
-/// The portable version of [`raise_to_products`].
 fn raise_portable(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
     for i in 0..BLOCK {
         let row = &left[i * depth..(i + 1) * depth];
@@ -113,8 +108,7 @@ fn raise_portable(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
     }
 }
 
-/// The version of [`raise_to_products`] for AVX2. Rows are arrays, not pointers, whose loads a build with debug assertions would check
-/// one by one, at three times the cost.
+/// The version for AVX2. Rows are arrays: a build with debug assertions would check loads through pointers one by one.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
@@ -155,7 +149,6 @@ fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
     }
 }
 
-/// The version of [`raise_to_products`] for AVX-512 with VNNI, where one instruction does 64 multiplications.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vnni")]
 fn raise_vnni(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {

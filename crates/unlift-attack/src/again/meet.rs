@@ -17,11 +17,8 @@ pub(super) struct Line {
 /// The place where a line is nearest to another one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meet {
-    /// The place, on the first line.
     pub point: [f64; 3],
-    /// Distance between the lines.
     pub miss: f64,
-    /// Sine of the angle between them.
     pub sine: f64,
 }
 
@@ -68,18 +65,14 @@ pub(super) fn nearest(own: &[Line], others: &[Line]) -> Option<(usize, Meet)> {
     meets.min_by(|a, b| a.1.miss.total_cmp(&b.1.miss))
 }
 
-/// Nearest lines that are kept per record.
 pub(super) const KEPT: usize = 8;
-/// Lines that are compared at once.
 const LANES: usize = 16;
 
 /// A line that passes a record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     pub miss: f64,
-    /// Row of the record's line.
     pub own: u32,
-    /// Row of the other line.
     pub other: u32,
 }
 
@@ -97,7 +90,6 @@ pub(super) fn search(lines: &[Line], per_record: usize, others: &[Line]) -> Vec<
     lines.par_chunks(per_record).enumerate().map(of_record).collect()
 }
 
-/// Returns points and directions in columns, filled up with lines that pass far away.
 fn columns(lines: &[Line]) -> [Vec<f64>; 6] {
     std::array::from_fn(|c| {
         let value = |line: &Line| if c < 3 { line.point[c] } else { line.direction[c - 3] };
@@ -107,7 +99,6 @@ fn columns(lines: &[Line]) -> [Vec<f64>; 6] {
     })
 }
 
-/// Compares one line with all others.
 struct Pass<'a> {
     line: Line,
     own: u32,
@@ -153,17 +144,14 @@ fn limit2(near: &[Near]) -> f64 {
     if near.len() < KEPT { f64::MAX } else { near[KEPT - 1].miss * near[KEPT - 1].miss }
 }
 
-/// Rounds of estimation.
 const ROUNDS: usize = 50;
-/// Least noise, as a share of the usual distance.
 const LEAST: f64 = 1e-12;
 /// Most noise, as a share of the usual distance, at which right links stand out.
 const MOST: f64 = 0.1;
 
 /// Returns the probability of each link and the noise of the right ones. A distance of 1 is usual of wrong links.
 ///
-/// Distances of wrong links are exponential, those of right ones are Cauchy's, because the noise depends on the angle between
-/// records. Their scale and share are learned from all links (expectation maximization).
+/// Distances of wrong links are exponential, those of right ones are Cauchy's. Scale and share are learned (expectation maximization).
 pub(super) fn trust(distances: &[f64]) -> (Vec<f64>, f64) {
     if distances.is_empty() {
         return (Vec::new(), LEAST);
@@ -190,7 +178,6 @@ pub(super) fn trust(distances: &[f64]) -> (Vec<f64>, f64) {
         share = (sum / distances.len() as f64).clamp(0.001, 0.999);
     }
     if scale > MOST {
-        // Nothing stands out from wrong links.
         found.fill(0.0);
     }
     (found, scale)

@@ -40,7 +40,6 @@ struct Flats {
     per_record: usize,
     /// Axis and coordinate of each plane.
     planes: Vec<(usize, f64)>,
-    /// Points with swapped coordinates.
     swapped: Vec<[f64; 3]>,
     /// The origin of the release in this frame.
     shift: [f64; 3],
@@ -102,7 +101,6 @@ struct Place {
     miss: Option<f64>,
     /// Error of the point along its record, if the records are off by one.
     condition: f64,
-    /// Swapped axis.
     axis: u8,
     /// Whether the records leave more than one point.
     is_open: bool,
@@ -178,8 +176,7 @@ pub fn by_descriptors(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error>
     solved(a, &linked.collect::<Vec<_>>(), usual, RowOrder::DescriptorRows)
 }
 
-/// Recovers the points of `a` from records alone: of two lines that meet within rounding, one belongs to the other. The order of the
-/// two points of a paired line stays unknown.
+/// Recovers the points of `a` from records alone: of two lines that meet within rounding, one belongs to the other.
 ///
 /// # Errors
 /// When a release has planes, which meet all records, both have swapped coordinates, which all agree in one coordinate with others,
@@ -235,16 +232,12 @@ fn check(a: &Released<3>, b: &Released<3>) -> Result<(), Error> {
     }
 }
 
-/// Two linked records.
 struct Linked {
-    /// Row of the first release.
     row: usize,
-    /// Record of the second release.
     partner: u32,
     place: Place,
     /// Distance between the records in units of the usual one of wrong pairs; `None` if all such records meet.
     unusual: Option<f64>,
-    /// Probability of the link by its descriptors, where records say nothing.
     by_descriptor: f64,
 }
 

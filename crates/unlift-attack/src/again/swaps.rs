@@ -1,9 +1,8 @@
 //! Points whose coordinates were swapped in two releases.
 //!
-//! The two records of a point agree except in the swapped coordinates. If these are of two axes, the point is the first record with one
-//! of them replaced, and which one is the same question for the partner of the swap: it has the same two values, exchanged. Where a point
-//! was swapped along one axis in both releases, three or more points share values in a cycle, which tells who is whose partner
-//! (docs/decisions/again.md). So one answer decides many, and few stay open: those go where points are denser.
+//! The two records of a point agree except in the swapped coordinates. Which of two swapped axes the point has is the same question for its
+//! partner, and cycles of shared values link points (docs/decisions/again.md). So one answer decides many; the others go where points are
+//! denser.
 
 use super::Place;
 use crate::geometry::knn::Knn;
@@ -26,7 +25,6 @@ impl Node {
         self.axes.len() == 2
     }
 
-    /// Returns the first record with its swapped coordinate replaced.
     fn point(&self, first: bool) -> ([f64; 3], usize) {
         let axis = self.axes[usize::from(!first)];
         let mut point = self.a;
@@ -40,7 +38,6 @@ struct Cycle {
     axis: usize,
     /// [`MISSING`] for a point that only one release has, which closes a chain.
     nodes: Vec<usize>,
-    /// Values of the first records.
     values: Vec<f64>,
     /// Places of the two nodes that only one release swapped along this axis.
     ends: [usize; 2],
@@ -91,8 +88,7 @@ pub(super) fn solve(
     places
 }
 
-/// Returns the largest difference of coordinates that agree: the smallest one of most records is rounding or noise. It is zero if both
-/// releases have the same frame.
+/// Returns the largest difference of coordinates that agree; the smallest one of most records is rounding or noise.
 fn same(a: &[[f64; 3]], b: &[[f64; 3]], records: &[(usize, usize)]) -> f64 {
     let least = |&(own, other): &(usize, usize)| {
         (0..3).map(|c| (a[own][c] - b[other][c]).abs()).fold(f64::INFINITY, f64::min)

@@ -1,6 +1,7 @@
 //! Records as the lines on which their points may lie.
 
 use std::any::Any;
+use std::cmp::Ordering;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,8 +22,6 @@ pub(crate) enum Hides {
     OnAxis,
 }
 
-/// All records of a map.
-#[derive(Debug)]
 pub(crate) struct Feasible {
     pub(crate) hides: Hides,
     /// Lines and rays without an end, `per_record` per record. Rays of one center always meet there, so they are no evidence for each other.
@@ -34,8 +33,7 @@ pub(crate) struct Feasible {
 }
 
 impl Feasible {
-    /// Converts the records of `released`; `None` in the plane, where all lines meet, and for planes, whose offsets are three histograms that
-    /// do not show which offsets belong together.
+    /// Converts the records of `released`; `None` in 2D, where all lines meet, and for planes, which do not show what belongs together.
     pub(crate) fn new<const D: usize>(released: &Released<D>) -> Option<Self> {
         let released: &Released<3> = (released as &dyn Any).downcast_ref()?;
         let line = |row: LineRow<3>| LineRow { to: f32::INFINITY, ..row };
@@ -68,13 +66,11 @@ impl Feasible {
         Some(Self { hides, lines, prior, per_record, n_groups })
     }
 
-    /// Number of records.
     pub(crate) fn n_records(&self) -> usize {
         self.lines.len() / self.per_record
     }
 
-    /// Measures parameters from the point nearest to `middle`. The origin of a map is rounded, so a shifted or scaled map has other feet. Rays
-    /// keep their center.
+    /// Measures parameters from the point nearest to `middle`, because shifted maps have other feet. Rays keep their center.
     pub(crate) fn counted_from(mut self, middle: &[f64; 3]) -> Self {
         for line in self.lines.iter_mut().filter(|line| !line.is_ray()) {
             line.through = nearest(line, middle).map(|x| x as f32);
@@ -86,8 +82,8 @@ impl Feasible {
     pub(crate) fn middle(&self) -> Option<([f64; 3], f64)> {
         let (middle, extent) = match self.hides {
             Hides::OnRay => between_centers(&self.lines),
-            _ => crossing(&self.lines),
-        }?;
+            Hides::One | Hides::Two | Hides::OnAxis => crossing(&self.lines)?,
+        };
         // Grids square voxel sides in f32.
         let usable = (extent as f32 * extent as f32).is_normal() && extent > 0.0;
         usable.then_some((middle, extent))
@@ -95,27 +91,15 @@ impl Feasible {
 }
 
 /// Returns the mean of the centers of rays, and the largest distance between two of them.
-fn between_centers(lines: &[LineRow<3>]) -> Option<([f64; 3], f64)> {
-    let mut centers: Vec<[f64; 3]> = Vec::new();
-    for line in lines {
-        let center = widen(&line.through);
-        if !centers.contains(&center) {
-            centers.push(center);
-        }
-    }
-    if centers.is_empty() {
-        return None;
-    }
+fn between_centers(lines: &[LineRow<3>]) -> ([f64; 3], f64) {
+    let mut centers: Vec<[f64; 3]> = lines.iter().map(|line| widen(&line.through)).collect();
     // Sorted, so that the result does not depend on the order of records.
-    centers.sort_unstable_by(|a, b| {
-        let axes = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
-        axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
-    });
+    centers.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+    centers.dedup();
     let n = centers.len() as f64;
     let middle = std::array::from_fn(|c| centers.iter().map(|x| x[c]).sum::<f64>() / n);
-    let apart = |a: &[f64; 3]| centers.iter().map(|b| distance(a, b)).fold(0.0, f64::max);
-    let extent = centers.iter().map(apart).fold(0.0, f64::max);
-    Some((middle, extent))
+    let pairs = centers.iter().flat_map(|a| centers.iter().map(|b| distance(a, b)));
+    (middle, pairs.fold(0.0, f64::max))
 }
 
 /// Lines are parallel if the determinant of their normal equations is below this fraction of that of random lines.
@@ -123,8 +107,7 @@ const PARALLEL: f64 = 1e-5;
 
 /// Returns the least-squares intersection of lines, and the median distance of the lines from it; `None` for parallel lines.
 fn crossing(lines: &[LineRow<3>]) -> Option<([f64; 3], f64)> {
-    // The squared distance from a line is |(I - d d') (x - p)|^2, which gives normal equations in x. Terms are sorted before they are summed,
-    // so that the order of records changes no bit.
+    // The squared distance from a line is |(I - d d') (x - p)|^2. Sums of sorted terms do not depend on the order of records.
     let across = |line: &LineRow<3>, row: usize, column: usize| {
         f64::from(u8::from(row == column))
             - f64::from(line.direction[row]) * f64::from(line.direction[column])
@@ -144,18 +127,12 @@ fn crossing(lines: &[LineRow<3>]) -> Option<([f64; 3], f64)> {
         return None;
     }
     let middle: [f64; 3] = (matrix.try_inverse()? * right).into();
-    let mut distances: Vec<f64> = lines
-        .iter()
-        .map(|line| {
-            let away = sub(&nearest(line, &middle), &middle);
-            dot(&away, &away).sqrt()
-        })
-        .collect();
+    let mut distances: Vec<f64> =
+        lines.iter().map(|line| distance(&nearest(line, &middle), &middle)).collect();
     let sound = !distances.is_empty() && distances.iter().all(|x| x.is_finite());
     sound.then(|| (middle, median(&mut distances)))
 }
 
-/// Returns the point of a line nearest to `x`.
 fn nearest(line: &LineRow<3>, x: &[f64; 3]) -> [f64; 3] {
     let (through, direction) = (widen(&line.through), widen(&line.direction));
     along(&through, dot(&sub(x, &through), &direction), &direction)
@@ -164,7 +141,6 @@ fn nearest(line: &LineRow<3>, x: &[f64; 3]) -> [f64; 3] {
 /// Number of values to either side over which the density of published values is measured.
 const REACH: usize = 50;
 
-/// Returns, per axis and record, the density of the published values of that axis around the record's value.
 fn value_densities(candidates: &AxisCandidates<3>) -> [Vec<f32>; 3] {
     let n = candidates.position().len();
     std::array::from_fn(|axis| {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::Peaks;
-use super::feasible::Hides;
+use super::feasible::{Feasible, Hides};
 use super::spread::Spread;
 use crate::recover::map::LineRow;
 use crate::recover::result::Estimate;
@@ -15,51 +15,34 @@ const REACH: usize = 2;
 
 /// Returns the most probable place of every slot's point.
 pub(super) fn find(spread: &Spread<'_>) -> Peaks {
-    let feasible = spread.feasible;
-    let slots = if feasible.hides == Hides::Two { 2 } else { 1 };
-    let mut of: Vec<Option<Estimate<3>>> = vec![None; slots * feasible.n_records()];
-    of.par_chunks_mut(slots).enumerate().for_each_init(
-        || (Vec::new(), Vec::new()),
-        |(view, windows), (record, out)| {
-            spread.view(record, spread.weights_of(record), view);
-            let lines = record * feasible.per_record..(record + 1) * feasible.per_record;
-            if let [first, second] = out {
-                let (line, span) = (&feasible.lines[record], &spread.spans[record]);
-                Window::all(view, span, spread.grid.cell, windows);
-                let total = view.iter().sum();
-                if let Some(pair) = best_pair(windows) {
-                    [*first, *second] = pair.map(|w| peak(&w, line, 0, total, view.len()));
-                }
-            } else {
-                out[0] = best(spread, lines, view, windows);
-            }
-        },
-    );
+    let Feasible { hides, lines, per_record, .. } = spread.feasible;
+    let slots = if *hides == Hides::Two { 2 } else { 1 };
+    let n_records = spread.feasible.n_records();
+    let place = |(view, windows): &mut (Vec<f32>, Vec<Window>), record: usize| {
+        spread.view(record, spread.weights_of(record), view);
+        windows.clear();
+        for axis in 0..*per_record {
+            let span = &spread.spans[record * per_record + axis];
+            let view = &view[windows.len()..windows.len() + span.len()];
+            windows.extend(Window::all(view, span, axis, spread.grid.cell));
+        }
+        let pair = if slots == 2 { best_pair(windows) } else { best(windows).map(|one| [one; 2]) };
+        let total = view.iter().sum();
+        let estimate = |window: Window| {
+            peak(&window, &lines[record * per_record + window.axis], total, view.len())
+        };
+        let estimates = pair.map_or([None; 2], |pair| pair.map(estimate));
+        estimates.into_iter().take(slots)
+    };
+    let scratch = || (Vec::new(), Vec::new());
+    let of = (0..n_records).into_par_iter().map_init(scratch, place).flatten_iter().collect();
     Peaks { of, resolution: f64::from(spread.grid.cell) }
 }
 
-/// Returns the place with the largest likelihood around it on any line of a record.
-fn best(
-    spread: &Spread<'_>,
-    lines: Range<usize>,
-    view: &[f32],
-    windows: &mut Vec<Window>,
-) -> Option<Estimate<3>> {
-    let total = view.iter().sum();
-    let mut found: Option<(Window, usize)> = None;
-    let mut begin = 0;
-    for at in lines.clone() {
-        let span = &spread.spans[at];
-        Window::all(&view[begin..begin + span.len()], span, spread.grid.cell, windows);
-        begin += span.len();
-        for window in windows.iter() {
-            if window.likelihood > found.map_or(0.0, |(best, _)| best.likelihood) {
-                found = Some((*window, at));
-            }
-        }
-    }
-    let (window, at) = found?;
-    peak(&window, &spread.feasible.lines[at], at - lines.start, total, view.len())
+/// Returns the window with the largest likelihood; the first one of equal ones.
+fn best(windows: &[Window]) -> Option<Window> {
+    let possible = windows.iter().filter(|window| window.likelihood > 0.0).copied();
+    possible.reduce(|best, next| if next.likelihood > best.likelihood { next } else { best })
 }
 
 /// Returns the two places with the largest joint likelihood, which grows with their distance.
@@ -90,40 +73,34 @@ pub(crate) fn maxima<T: Copy + Default + PartialOrd>(values: &[T]) -> impl Itera
     (0..values.len()).filter(is_maximum)
 }
 
-/// Likelihood around one sample.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     likelihood: f32,
+    /// Number of its line among those of the record.
+    axis: usize,
     /// Mean parameter.
     t: f32,
 }
 
 impl Window {
-    /// Computes one window per sample of a line.
-    fn all(view: &[f32], span: &Range<i32>, side: f32, out: &mut Vec<Self>) {
-        out.clear();
-        for at in 0..view.len() {
+    /// Returns one window per sample of a line.
+    fn all(view: &[f32], span: &Range<i32>, axis: usize, side: f32) -> impl Iterator<Item = Self> {
+        (0..view.len()).map(move |at| {
             let from = at.saturating_sub(REACH);
             let near = &view[from..view.len().min(at + REACH + 1)];
             let likelihood: f32 = near.iter().sum();
             let moment: f32 = near.iter().enumerate().map(|(i, x)| i as f32 * x).sum();
             let first = (span.start + from as i32) as f32 + 0.5;
             let shift = if likelihood > 0.0 { moment / likelihood } else { 0.0 };
-            out.push(Self { likelihood, t: (first + shift) * side });
-        }
+            Self { likelihood, axis, t: (first + shift) * side }
+        })
     }
 }
 
-fn peak(
-    window: &Window,
-    line: &LineRow<3>,
-    axis: usize,
-    total: f32,
-    n_samples: usize,
-) -> Option<Estimate<3>> {
+fn peak(window: &Window, line: &LineRow<3>, total: f32, n_samples: usize) -> Option<Estimate<3>> {
     let position = line.at(window.t);
     let blind = (2 * REACH + 1) as f32 / n_samples as f32;
     let evidence = libm::logf(window.likelihood / total / blind).max(0.0);
     let sound = evidence.is_finite() && position.iter().all(|x| x.is_finite());
-    sound.then(|| Estimate::at(position, 0, axis, evidence))
+    sound.then(|| Estimate::at(position, 0, window.axis, evidence))
 }

@@ -13,14 +13,11 @@ const ROUNDS: usize = 4;
 /// Least density that a record sees after its own part is subtracted, as a fraction of the density.
 const LEAST_OTHERS: f32 = 1e-4;
 
-/// The weights of every record's point along its lines, and the density that results.
 pub(super) struct Spread<'a> {
     pub(super) feasible: &'a Feasible,
-    /// Density of all records, smoothed.
     pub(super) grid: Grid<3>,
     /// For rays, the density from rays of other centers, per center; else empty.
     others: Vec<Grid<3>>,
-    /// Samples per line.
     pub(super) spans: Vec<Range<i32>>,
     /// Start of the weights of each record, and the end of the last.
     offsets: Vec<usize>,
@@ -32,8 +29,7 @@ impl<'a> Spread<'a> {
     pub(super) fn new(feasible: &'a Feasible, grid: Grid<3>) -> Self {
         let spans: Vec<Range<i32>> =
             feasible.lines.par_iter().map(|line| grid.span(line)).collect();
-        let mut offsets = vec![0];
-        let mut n_samples = 0;
+        let (mut offsets, mut n_samples) = (vec![0], 0);
         for spans in spans.chunks(feasible.per_record) {
             n_samples += spans.iter().map(|span| span.len()).sum::<usize>();
             offsets.push(n_samples);
@@ -48,35 +44,29 @@ impl<'a> Spread<'a> {
         }
     }
 
-    /// The weights of `record`, line after line.
     pub(super) fn weights_of(&self, record: usize) -> &[f32] {
         &self.weights[self.offsets[record]..self.offsets[record + 1]]
     }
 
-    /// Computes the likelihood of each sample of `record` at the density of other records' points, up to a common factor, into `out`. For
-    /// two points it is the likelihood of one of them.
+    /// Computes into `out` the likelihood of each sample of `record`, for one of its points, at the density of other records' points.
     pub(super) fn view(&self, record: usize, own: &[f32], out: &mut Vec<f32>) {
         let per_record = self.feasible.per_record;
+        let subtracts = self.others.is_empty();
         out.clear();
         for at in record * per_record..(record + 1) * per_record {
             let (line, span) = (&self.feasible.lines[at], self.spans[at].clone());
-            let begin = out.len();
-            let subtracts = self.others.is_empty();
             let grid = self.others.get(line.group as usize).unwrap_or(&self.grid);
             let prior = self.feasible.prior.get(at).copied().unwrap_or(1.0);
-            let own = &own[begin..begin + span.len()];
+            let own = &own[out.len()..out.len() + span.len()];
             let kernel = self_kernel(line);
-            for (at, k) in span.enumerate() {
-                let Some(voxel) = grid.voxel(line, k) else {
-                    out.push(0.0);
-                    continue;
-                };
+            out.extend(span.enumerate().map(|(at, k)| {
+                let Some(voxel) = grid.voxel(line, k) else { return 0.0 };
                 let all = grid.values[voxel];
                 let mine = if subtracts { convolve(own, at, &kernel) } else { 0.0 };
                 let others = (all - mine).max(all * LEAST_OTHERS) * prior;
-                let t = grid.parameter(k);
-                out.push(if line.is_ray() { others * t * t } else { others });
-            }
+                let t = (k as f32 + 0.5) * grid.cell;
+                if line.is_ray() { others * t * t } else { others }
+            }));
         }
     }
 
@@ -101,8 +91,7 @@ impl<'a> Spread<'a> {
         self.weights = weights;
     }
 
-    /// Turns the likelihood of one point into that of one of two: a pair at distance `d` has `d^2` times the probability to be paired along
-    /// this line.
+    /// Turns the likelihood of one point into that of one of two: a pair at distance `d` is `d^2` times as probable.
     fn pair_up(&self, record: usize, view: &mut [f32]) {
         let first = self.spans[record].start;
         // Relative to the middle of the span, to avoid a difference of large squares.
@@ -135,8 +124,7 @@ impl<'a> Spread<'a> {
         self.grid.smooth(1);
     }
 
-    /// Sums the weights of the lines that `admit` accepts, per voxel. Sums are of integers, so they depend neither on threads nor on the
-    /// order of records.
+    /// Sums the weights of the lines that `admit` accepts, per voxel. Sums of integers depend neither on threads nor on order.
     fn deposit(&self, admit: impl Fn(&LineRow<3>) -> bool + Sync) -> Vec<f32> {
         let (grid, per_record) = (&self.grid, self.feasible.per_record);
         let sums: Vec<AtomicU32> = grid.values.iter().map(|_| AtomicU32::new(0)).collect();
@@ -146,8 +134,10 @@ impl<'a> Spread<'a> {
                 let line = &self.feasible.lines[at];
                 for (k, weight) in self.spans[at].clone().zip(weights.by_ref()) {
                     let quantum = (weight * QUANTA + 0.5) as u32;
-                    let voxel = grid.voxel(line, k).filter(|_| quantum > 0 && admit(line));
-                    if let Some(voxel) = voxel {
+                    if let Some(voxel) = grid.voxel(line, k)
+                        && quantum > 0
+                        && admit(line)
+                    {
                         let add = |sum: u32| Some(sum.saturating_add(quantum));
                         let _ = sums[voxel].fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
                     }
@@ -180,4 +170,84 @@ fn convolve(weights: &[f32], at: usize, kernel: &[f32; 3]) -> f32 {
         sum += kernel[steps] * (before + after);
     }
     sum
+}
+
+// Samples of the density along lines, and other boxes of it.
+
+impl Grid<3> {
+    /// Returns the steps of `line` in the box. Step `k` is at parameter `(k + 1/2) cell`. A few at its ends may lie just outside.
+    pub(super) fn span(&self, line: &LineRow<3>) -> Range<i32> {
+        let (from, to) = self.clip(line).unwrap_or_default();
+        // Farther away, parameters of neighboring steps are equal.
+        let far = (1 << 22) as f32 * self.cell;
+        if !(from < to && from.abs() < far && to.abs() < far) {
+            return 0..0;
+        }
+        let first = (from / self.cell - 0.5).ceil() as i32;
+        first..((to / self.cell - 0.5).floor() as i32 + 1).max(first)
+    }
+
+    /// Returns the voxel of step `k` of `line`; `None` outside the box.
+    #[inline(always)]
+    pub(super) fn voxel(&self, line: &LineRow<3>, k: i32) -> Option<usize> {
+        let t = (k as f32 + 0.5) * self.cell;
+        let x: [f32; 3] = std::array::from_fn(|c| {
+            (line.through[c] + t * line.direction[c] - self.low[c]) / self.cell
+        });
+        let at = x.map(|x| x as usize);
+        if !(0..3).all(|c| x[c] >= 0.0 && at[c] < self.dims[c]) {
+            return None;
+        }
+        Some((at[0] * self.dims[1] + at[1]) * self.dims[2] + at[2])
+    }
+
+    /// Returns the density in another box, linearly interpolated, up to a common factor.
+    pub(super) fn resampled(&self, low: [f32; 3], cell: f32, dims: [usize; 3]) -> Self {
+        let mut finer = Self::even(low, cell, dims, 0.0);
+        // Per axis and voxel: the lower of the two coarse voxels, and the weight of the upper one.
+        let places: [Vec<(usize, f32)>; 3] = std::array::from_fn(|c| {
+            let place = |i: usize| self.lower(c, low[c] + (i as f32 + 0.5) * cell);
+            (0..dims[c]).map(place).collect()
+        });
+        finer.values.par_chunks_mut(dims[2]).enumerate().for_each(|(row, out)| {
+            let [x, y] = [places[0][row / dims[1]], places[1][row % dims[1]]];
+            for (out, &z) in out.iter_mut().zip(&places[2]) {
+                for corner in 0..8 {
+                    let (at, share) = self.corner(corner, &[x, y, z], 1.0);
+                    *out += share * self.values[at];
+                }
+            }
+        });
+        finer
+    }
+
+    /// Returns the box that leaves the fraction `q` of the mass beyond each wall, extended by a voxel.
+    pub(super) fn bounds(&self, q: f64) -> ([f32; 3], [f32; 3]) {
+        let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+        let layer = self.dims[1] * self.dims[2];
+        for c in 0..3 {
+            let mut profile = vec![0.0f64; self.dims[c]];
+            for (at, &mass) in self.values.iter().enumerate() {
+                let place = [at / layer, at / self.dims[2] % self.dims[1], at % self.dims[2]];
+                profile[place[c]] += f64::from(mass);
+            }
+            let beyond = q * profile.iter().sum::<f64>();
+            let below = count_below(profile.iter(), beyond);
+            let above = self.dims[c] - count_below(profile.iter().rev(), beyond);
+            low[c] = self.low[c] + (below as f32 - 1.0) * self.cell;
+            high[c] = self.low[c] + (above.max(below + 1) as f32 + 1.0) * self.cell;
+        }
+        (low, high)
+    }
+}
+
+/// Returns how many leading entries have a sum of at most `most`.
+fn count_below<'a>(entries: impl Iterator<Item = &'a f64>, most: f64) -> usize {
+    let mut sum = 0.0;
+    entries
+        .take_while(|&&mass| {
+            sum += mass;
+            sum <= most
+        })
+        .count()
 }

@@ -6,12 +6,10 @@ use super::vector::{dot, quantile, quantile_of};
 
 /// Fraction of the points that decide the thickness; the rest may be outliers.
 const KEPT: f64 = 0.9;
-/// Largest number of steps that search the thinnest direction among the kept points.
 const STEPS: usize = 8;
 
-/// Returns the smallest extent of `points` divided by the largest one: 0 on a plane or a line, near 1 in a ball; 0 for fewer than two
-/// places. Extents are those of the middle 90 % along the principal axes of the 90 % nearest to the best plane, so that outliers do
-/// not count (least trimmed squares by concentration steps: Rousseeuw and Van Driessen 1999).
+/// Returns the smallest extent of `points` divided by the largest one: 0 on a plane or a line, near 1 in a ball. Extents are those of the
+/// middle 90 % of the points nearest to the best plane (least trimmed squares by concentration steps: Rousseeuw and Van Driessen 1999).
 pub fn flatness<const D: usize>(points: &[[f64; D]]) -> f64 {
     let mut kept: Vec<[f64; D]> = points.to_vec();
     let mut flattest = 1.0;
@@ -28,7 +26,11 @@ pub fn flatness<const D: usize>(points: &[[f64; D]]) -> f64 {
             break;
         }
         flattest = flat;
-        kept = nearest_to_plane(points, &kept, &thin);
+        // The points nearest to the plane across this axis, in their order.
+        let middle = quantile_of(kept.iter().map(|p| dot(p, &thin)), 0.5);
+        let away = |p: &[f64; D]| (dot(p, &thin) - middle).abs();
+        let limit = quantile_of(points.iter().map(away), KEPT);
+        kept = points.iter().filter(|p| away(p) <= limit).copied().collect();
     }
     flattest
 }
@@ -56,18 +58,6 @@ fn extent<const D: usize>(points: &[[f64; D]], axis: &[f64; D]) -> f64 {
     let mut along: Vec<f64> = points.iter().map(|p| dot(p, axis)).collect();
     along.sort_unstable_by(f64::total_cmp);
     if along.is_empty() { 0.0 } else { quantile(&along, 0.95) - quantile(&along, 0.05) }
-}
-
-/// Returns the [`KEPT`] of `points` nearest to the plane across `axis` through the median of `kept`, in their order.
-fn nearest_to_plane<const D: usize>(
-    points: &[[f64; D]],
-    kept: &[[f64; D]],
-    axis: &[f64; D],
-) -> Vec<[f64; D]> {
-    let middle = quantile_of(kept.iter().map(|p| dot(p, axis)), 0.5);
-    let away = |p: &[f64; D]| (dot(p, axis) - middle).abs();
-    let limit = quantile_of(points.iter().map(away), KEPT);
-    points.iter().filter(|p| away(p) <= limit).copied().collect()
 }
 
 #[cfg(test)]

@@ -3,8 +3,9 @@
 //! The search tree is a balanced k-d tree. Points are stored leaf by leaf, one column per coordinate, so that a leaf takes a few vector
 //! instructions. The index of a node determines its place in the columns, so only boxes are stored.
 //!
-//! A query first searches the smallest node around its point that holds enough others. The K-th distance found there is an upper bound.
-//! Then it takes every point within that bound, so that no tie is missed.
+//! A query first takes an upper bound from a node around its point that holds enough others, then every point within that bound.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -13,7 +14,6 @@ use crate::geometry::frame::Bounds;
 use crate::geometry::vector::squared_distance;
 use crate::simd::{Kernel, dispatch};
 
-/// Largest number of points per leaf.
 pub(crate) const LEAF: usize = 16;
 /// Nodes with fewer points are split without parallelism.
 const ALONE: usize = 1 << 14;
@@ -25,10 +25,9 @@ pub struct Knn<'a, const D: usize> {
     depth: u32,
     /// Boxes of the nodes: the root is 1, the halves of node `i` are `2 i` and `2 i + 1`.
     boxes: Vec<Bounds<D>>,
-    /// Coordinates in leaf order.
     columns: [Vec<f64>; D],
     /// Row at each place of the leaf order.
-    rows: Vec<u32>,
+    pub(crate) rows: Vec<u32>,
     /// Place of each row.
     places: Vec<u32>,
 }
@@ -48,8 +47,7 @@ impl<const D: usize> Bounds<D> {
         points.fold(Self::EMPTY, |all, p| all.and(&Self { low: p, high: p }))
     }
 
-    /// Returns a lower bound, rounding included, of the squared distance from `query` to any point inside: every operation is that of the
-    /// distance itself, and each rounds monotonically.
+    /// Returns a lower bound, rounding included, of the squared distance from `query` to any point inside: each operation is monotonic.
     #[inline(always)]
     fn squared_distance(&self, query: &[f64; D]) -> f64 {
         let mut sum = 0.0;
@@ -96,8 +94,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         Ok(Self { points, depth, boxes, columns, rows, places })
     }
 
-    /// Returns all rows in patches of near ones: the box is split along its longest side until a patch holds at most `most` rows (but a
-    /// leaf is never split).
+    /// Returns all rows in patches of near ones: the box is split along its longest side down to leaves or at most `most` rows.
     pub fn patches(&self, most: usize) -> Vec<&[u32]> {
         let n = self.rows.len();
         let fits = |level: &u32| n.div_ceil(1 << level) <= most.max(1);
@@ -116,8 +113,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.search(position, None, k, found);
     }
 
-    /// Returns `of(row, its k(row) nearest other rows)` for every row, in the order of rows. The nearest are (squared distance, row),
-    /// nearest first.
+    /// Returns `of(row, its k(row) nearest other rows)` for every row. The nearest are (squared distance, row), nearest first.
     pub fn per_row<T: Send>(
         &self,
         k: impl Fn(usize) -> usize + Sync,
@@ -149,19 +145,9 @@ impl<'a, const D: usize> Knn<'a, D> {
         });
     }
 
-    /// Returns the rows leaf by leaf.
-    pub(crate) fn leaf_order(&self) -> &[u32] {
-        &self.rows
-    }
-
     /// Calls `of` with ranges of the leaf order that contain every point whose squared distance to a position is at most `bound`.
     #[inline(always)]
-    pub(crate) fn leaves(
-        &self,
-        position: &[f64; D],
-        bound: f64,
-        of: impl FnMut(std::ops::Range<usize>),
-    ) {
+    pub(crate) fn leaves(&self, position: &[f64; D], bound: f64, of: impl FnMut(Range<usize>)) {
         self.leaves_within(position, (bound, usize::MAX), usize::MAX, of);
     }
 
@@ -193,15 +179,14 @@ impl<'a, const D: usize> Knn<'a, D> {
         node - (1 << self.depth)
     }
 
-    /// Calls `take` with the places of every leaf within the squared distance `bound`, except those below node `but`; of coinciding points,
-    /// with at least the `most` that have the lowest rows.
+    /// Calls `take` with the places of every leaf within the squared distance `bound`, except below `but`, by [`lowest`](Self::lowest).
     #[inline(always)]
     fn leaves_within(
         &self,
         query: &[f64; D],
         (bound, most): (f64, usize),
         but: usize,
-        mut take: impl FnMut(std::ops::Range<usize>),
+        mut take: impl FnMut(Range<usize>),
     ) {
         let mut stack = [0usize; usize::BITS as usize];
         let mut height = 1;
@@ -225,16 +210,14 @@ impl<'a, const D: usize> Knn<'a, D> {
         }
     }
 
-    /// Whether all points of a node coincide.
     #[inline(always)]
     fn is_pile(&self, node: usize) -> bool {
         self.boxes[node].low == self.boxes[node].high
     }
 
-    /// Returns the places of a node. If its points coincide, returns only the leaves that hold the `most` lowest rows, because at equal
-    /// distances no others can be among the nearest.
+    /// Returns the places of a node; of coinciding points only leaves with the `most` lowest rows, as no others can be among the nearest.
     #[inline(always)]
-    fn lowest(&self, node: usize, most: usize) -> std::ops::Range<usize> {
+    fn lowest(&self, node: usize, most: usize) -> Range<usize> {
         let all = self.range(node);
         if all.len() <= most || !self.is_pile(node) {
             return all;
@@ -244,15 +227,13 @@ impl<'a, const D: usize> Knn<'a, D> {
         all.start..self.range((1 << self.depth) + last).end
     }
 
-    /// Returns the leaf of a place.
     #[inline(always)]
     fn leaf_of(&self, place: usize) -> usize {
         (((place + 1) << self.depth) - 1) / self.rows.len()
     }
 
-    /// Returns the places of a node.
     #[inline(always)]
-    fn range(&self, node: usize) -> std::ops::Range<usize> {
+    fn range(&self, node: usize) -> Range<usize> {
         let level = usize::BITS - 1 - node.leading_zeros();
         let below = self.depth - level;
         let first = (node << below) - (1 << self.depth);
@@ -267,8 +248,7 @@ fn canonical(&(squared, row): &(f64, u32)) -> u128 {
     (u128::from(squared.to_bits()) << 32) | u128::from(row)
 }
 
-/// Sorts `items`, the leaves from `first` on, into leaf order: splits along the longest side, `depth` times. `starts` returns the
-/// first place of a leaf.
+/// Sorts `items`, the leaves from `first` on, into leaf order. `starts` returns the first place of a leaf.
 fn split<const D: usize>(
     items: &mut [([f64; D], u32)],
     depth: u32,
@@ -317,11 +297,10 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
-        let Self { tree, query, own, leaf, k, found } = self;
-        let n_leaves = 1usize << tree.depth;
+    fn run(mut self) {
+        let Self { tree, k, .. } = self;
         // The smallest node with so many others that their K-th distance is near the true one.
-        let mut near = n_leaves + leaf;
+        let mut near = (1 << tree.depth) + self.leaf;
         while near > 1 && tree.range(near).len() < 2 * k + 1 {
             near /= 2;
         }
@@ -329,46 +308,38 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
         while near > 1 && tree.is_pile(near / 2) {
             near /= 2;
         }
-        let most = k + 1;
-        take(tree, &query, own, tree.lowest(near, most), f64::INFINITY, found);
+        let (most, query) = (k + 1, self.query);
+        self.take(tree.lowest(near, most), f64::INFINITY);
         if near == 1 {
             return;
         }
-        let bound = found.select_nth_unstable_by_key(k - 1, canonical).1.0;
-        found.retain(|item| item.0 <= bound);
-        tree.leaves_within(&query, (bound, most), near, |places| {
-            take(tree, &query, own, places, bound, found);
-        });
+        let bound = self.found.select_nth_unstable_by_key(k - 1, canonical).1.0;
+        self.found.retain(|item| item.0 <= bound);
+        tree.leaves_within(&query, (bound, most), near, |places| self.take(places, bound));
     }
 }
 
-/// Appends the points at `places` within the squared distance `bound` of `query`.
-#[inline(always)]
-fn take<const D: usize>(
-    tree: &Knn<'_, D>,
-    query: &[f64; D],
-    own: u32,
-    places: std::ops::Range<usize>,
-    bound: f64,
-    found: &mut Vec<(f64, u32)>,
-) {
-    let mut at = places.start;
-    while at < places.end {
-        let end = places.end.min(at + LEAF);
-        let mut squared = [0.0; LEAF];
-        // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
-        for (column, center) in tree.columns.iter().zip(query) {
-            for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
-                let d = center - x;
-                *sum += d * d;
+impl<const D: usize> Search<'_, '_, D> {
+    #[inline(always)]
+    fn take(&mut self, places: Range<usize>, bound: f64) {
+        let mut at = places.start;
+        while at < places.end {
+            let end = places.end.min(at + LEAF);
+            let mut squared = [0.0; LEAF];
+            // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
+            for (column, center) in self.tree.columns.iter().zip(&self.query) {
+                for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
+                    let d = center - x;
+                    *sum += d * d;
+                }
             }
-        }
-        for (place, &distance) in (at..end).zip(&squared) {
-            if distance <= bound && place as u32 != own {
-                found.push((distance, tree.rows[place]));
+            for (place, &distance) in (at..end).zip(&squared) {
+                if distance <= bound && place as u32 != self.own {
+                    self.found.push((distance, self.tree.rows[place]));
+                }
             }
+            at = end;
         }
-        at = end;
     }
 }
 
@@ -392,12 +363,12 @@ mod tests {
         let knn = Knn::new(points).unwrap();
         let mut found = Vec::new();
         for k in [1, 7, 50] {
-            let all = knn.per_row(|_| k, |_, found| found.to_vec());
+            let (all, kth) = (knn.per_row(|_| k, |_, found| found.to_vec()), knn.kth_distances(k));
             for (row, point) in points.iter().enumerate() {
                 let expected = brute_force(point, row, k);
-                assert_eq!(all[row], expected, "{row}, k {k}");
+                assert_eq!(kth[row], expected.last().map_or(0.0, |last| last.0.sqrt()));
                 knn.nearest(row, k, &mut found);
-                assert_eq!(found, expected, "{row}, k {k}");
+                assert_eq!([&all[row], &found], [&expected; 2], "{row}, k {k}");
                 if row % 8 == 0 {
                     let query = std::array::from_fn(|c| 0.7 * point[c] + 0.4 * points[row / 2][c]);
                     knn.nearest_to(query, k, &mut found);
@@ -412,11 +383,10 @@ mod tests {
         for n in [2, 23, 24, 25, 48, 49, 97, 300, 1000] {
             let mut draws = Draws::new(n, Stage::Synthetic, 0);
             // Cubing makes the middle a million times denser than the border.
-            let mut points = |_| std::array::from_fn(|_| draws.between(-1.0, 1.0).powi(3) * 1e3);
-            compare(&(0..n).map(&mut points).collect::<Vec<[f64; 3]>>());
-            let flat: Vec<[f64; 2]> =
-                (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
-            compare(&flat);
+            let points = (0..n).map(|_| [0; 3].map(|_| draws.between(-1.0, 1.0).powi(3) * 1e3));
+            let points: Vec<[f64; 3]> = points.collect();
+            compare(&points);
+            compare(&points.iter().map(|p| [p[0], p[1]]).collect::<Vec<[f64; 2]>>());
         }
         // A coarse lattice: most distances tie, many points coincide.
         let mut draws = Draws::new(5, Stage::Synthetic, 0);
@@ -435,19 +405,12 @@ mod tests {
 
     #[test]
     fn points_at_one_place_cost_no_more_than_others() {
+        assert!(Knn::<3>::new(&[]).is_err() && Knn::new(&[[0.0, f64::NAN]]).is_err());
         let points = vec![[1.0; 3]; 200_000];
         let knn = Knn::new(&points).unwrap();
         let sums = knn.per_row(|_| 50, |_, found| found.iter().map(|item| item.1).sum::<u32>());
         assert_eq!(sums[199_999], (0..50).sum::<u32>());
         let mut found = Vec::new();
         (0..points.len()).for_each(|row| knn.nearest(row, 50, &mut found));
-    }
-
-    #[test]
-    fn values_per_row_come_in_the_order_of_rows() {
-        let points = [[0.0, 0.0], [5.0, 0.0], [1.0, 0.0]];
-        let knn = Knn::new(&points).unwrap();
-        assert_eq!(knn.kth_distances(1), [1.0, 4.0, 1.0]);
-        assert!(Knn::<3>::new(&[]).is_err() && Knn::new(&[[0.0, f64::NAN]]).is_err());
     }
 }

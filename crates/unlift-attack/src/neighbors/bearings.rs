@@ -1,6 +1,7 @@
 //! Decoys among bearings: records whose neighbors by descriptors do not lie in nearby directions.
 
 use super::Neighborhoods;
+use crate::geometry::vector::{dot, widen};
 use crate::released::Released;
 
 /// Bearings within this angle support each other: the noise of decoys is three times as large.
@@ -10,8 +11,7 @@ pub const REAL: f64 = 1.5;
 /// Rounds in which records with more support count more.
 const ROUNDS: usize = 4;
 
-/// Returns the support of every record by its lists, as a multiple of that by chance; `None` unless records are bearings from one
-/// center. Decoys have little support: their descriptor comes from elsewhere. Listed records count by their own support.
+/// Returns the support of every record by its lists, as a multiple of that by chance; `None` unless records are bearings from one center.
 pub fn support<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Option<Vec<f64>> {
     let rays = released.obfuscation().rays()?;
     let n = rays.center().len();
@@ -20,8 +20,7 @@ pub fn support<const D: usize>(released: &Released<D>, lists: &Neighborhoods) ->
     }
     let directions = rays.direction();
     let near = |a: usize, b: usize| {
-        let cosine: f64 =
-            (0..D).map(|c| f64::from(directions[a][c]) * f64::from(directions[b][c])).sum();
+        let cosine = dot(&widen(&directions[a]), &widen(&directions[b]));
         f64::from(u8::from(cosine > libm::cos(NEARBY)))
     };
     // Records of a list, and records that list this one.
@@ -37,9 +36,9 @@ pub fn support<const D: usize>(released: &Released<D>, lists: &Neighborhoods) ->
     let mut found = vec![0.0; n];
     for _ in 0..ROUNDS {
         let of = |own: usize, by: usize| {
-            let total: f64 = listed[by].iter().map(|&other| weights[other as usize]).sum();
-            let agree =
-                listed[by].iter().map(|&other| weights[other as usize] * near(own, other as usize));
+            let others = || listed[by].iter().map(|&other| other as usize);
+            let total: f64 = others().map(|other| weights[other]).sum();
+            let agree = others().map(|other| weights[other] * near(own, other));
             agree.sum::<f64>() / total.max(1e-12)
         };
         let chance = (0..n).map(|own| of(own, (own + n / 2) % n)).sum::<f64>() / n as f64;

@@ -15,7 +15,6 @@ use crate::{Descriptors, Error};
 /// Largest number of rows of which all pairs are compared; this takes minutes on two cores. Of more rows, similar blocks are compared.
 pub const MOST_ROWS: usize = 1 << 17;
 
-/// Returns the note about inexact search for a source with this `name`, if there are too many slots.
 pub fn note(name: &str, n_slots: usize) -> Option<String> {
     (n_slots > MOST_ROWS).then(|| {
         format!(
@@ -28,7 +27,6 @@ pub fn note(name: &str, n_slots: usize) -> Option<String> {
 /// Rows from which typical scores are computed, if not all pairs are compared.
 const USUAL: usize = 16 * BLOCK;
 
-/// Number of blocks that each block of a large map is compared with.
 const PARTNERS: usize = 64;
 
 /// A similarity of two descriptors. The score of a pair does not depend on its order.
@@ -37,7 +35,6 @@ pub trait Likeness: Sync {
     const NAME: &'static str;
     /// Scores are rounded to multiples of this, so that their sums are exact in any order.
     const STEP: f32;
-    /// [`BLOCK`] rows, prepared for comparison.
     type Block: Send + Sync;
 
     /// Prepares the rows of `slots`, at most [`BLOCK`].
@@ -48,8 +45,7 @@ pub trait Likeness: Sync {
 }
 
 /// Returns the `n_best` best partners of every row among the rows of other records. The search is exact up to `exact` rows, and reads the
-/// scores of pairs that `kept` has. With more rows, similar rows are first made adjacent, and each block is compared with the blocks that
-/// have the most similar means. Mean and deviation of scores are computed if `counts`.
+/// scores that `kept` has. Of more rows, similar blocks are compared. Mean and deviation of scores are computed if `counts`.
 ///
 /// # Errors
 /// When there are more rows than `exact`, and the means of all blocks are equal.
@@ -185,7 +181,6 @@ impl Compared {
         found.into_par_iter().enumerate().map(finish).collect()
     }
 
-    /// Returns the rows at `at`, prepared for comparison.
     fn block<L: Likeness>(&self, likeness: &L, at: impl Iterator<Item = u32>) -> L::Block {
         let slots: Vec<u32> = at.map(|at| self.slots[at as usize]).collect();
         likeness.block(&self.descriptors, &slots)
@@ -222,8 +217,7 @@ impl Compared {
     }
 }
 
-/// Compares rows according to `tiles`; each row keeps its `n_best` best partners of other records. Mean and deviation come from
-/// the pairs with every `every`-th row; for 1, from those of `tiles`. Without `every`, neither is computed.
+/// Compares rows according to `tiles`. Mean and deviation come from the pairs with every `every`-th row; for 1, from those of `tiles`.
 ///
 /// What a row keeps depends on the set of its scores alone, so the result does not depend on the number of threads.
 fn compare<L: Likeness>(
@@ -348,7 +342,6 @@ impl Row {
         self.squares += squares;
     }
 
-    /// Takes back a counted score.
     fn uncount(&mut self, score: f32, step: f32) {
         let mut one = Self::new(0);
         one.count(&[score], &[0], 1, step);
@@ -366,7 +359,6 @@ impl Row {
     }
 }
 
-/// The result of comparing a row with others.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// The best rows of other records, best first; equal scores in row order.
@@ -377,8 +369,7 @@ pub struct Found {
     pub deviation: f64,
 }
 
-/// Keeps the entries with the highest scores, and among equal scores those with the lowest ids. The result depends on the set
-/// of entries alone.
+/// Keeps the entries with the highest scores, and among equal scores those with the lowest ids, in whatever order they come.
 #[derive(Clone, Debug)]
 pub struct Best {
     n_best: usize,
@@ -388,7 +379,6 @@ pub struct Best {
 }
 
 impl Best {
-    /// Keeps at most `n_best` entries.
     pub fn new(n_best: usize) -> Self {
         Self { n_best, floor: f32::NEG_INFINITY, entries: Vec::new() }
     }
@@ -435,7 +425,6 @@ const HELD: u32 = 256;
 
 /// Pairs of blocks with a range of blocks, which stay in memory meanwhile.
 struct Tile {
-    /// The blocks in memory.
     held: Range<usize>,
     /// Each block that is compared with some of them, and these.
     meetings: Vec<(u32, Vec<u32>)>,
@@ -470,13 +459,11 @@ fn chosen(alike: &[Found]) -> Vec<Tile> {
 
 // Similar blocks of a large map.
 
-/// Number of rows from which the direction is computed.
 const SAMPLE: usize = 256;
 /// Number of power iterations. An approximate direction suffices.
 const ITERATIONS: usize = 8;
 
-/// Reorders `slots` so that similar descriptors are adjacent. Rows are split at the median along the direction of largest variance,
-/// recursively, until a part is one block. All parts but the last are full.
+/// Reorders `slots` so that similar descriptors are adjacent: splits at the median along the direction of largest variance, recursively.
 fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
     if slots.len() <= BLOCK {
         return;
@@ -528,10 +515,7 @@ fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
     direction
 }
 
-/// Returns the mean row of each block of `slots`.
-///
-/// # Errors
-/// When all of them are equal.
+/// Returns the mean row of each block of `slots`; fails if all of them are equal.
 fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Error> {
     let mean = |slots: &[u32]| {
         let mut sum = vec![0.0f32; descriptors.dim()];
@@ -583,17 +567,16 @@ mod tests {
 
     #[test]
     fn few_blocks_all_meet() {
-        let descriptors = crowds(1_500, 128);
+        let of = crowds(1_500, 128);
         const { assert!(1_500 < BLOCK * PARTNERS) };
-        fn scores<L: Likeness>(likeness: &L, of: &Descriptors, exact: usize) -> Vec<f32> {
-            found(likeness, of, 10, exact).concat().into_iter().map(|(score, _)| score).collect()
-        }
-        assert_eq!(scores(&Cosine, &descriptors, 0), scores(&Cosine, &descriptors, MOST_ROWS));
-        let hypotheses = Hypotheses::of(&descriptors).unwrap();
-        assert_eq!(
-            scores(&hypotheses, &descriptors, 0),
-            scores(&hypotheses, &descriptors, MOST_ROWS)
-        );
+        let scores = |found: Vec<Vec<(f32, u32)>>| -> Vec<f32> {
+            found.concat().into_iter().map(|(score, _)| score).collect()
+        };
+        let hypotheses = Hypotheses::of(&of).unwrap();
+        let [some, all] = [0, MOST_ROWS].map(|exact| found(&Cosine, &of, 10, exact));
+        assert_eq!(scores(some), scores(all));
+        let [some, all] = [0, MOST_ROWS].map(|exact| found(&hypotheses, &of, 10, exact));
+        assert_eq!(scores(some), scores(all));
     }
 
     #[test]
@@ -603,12 +586,10 @@ mod tests {
         assert!(n_blocks > 3 * PARTNERS, "a third of the blocks");
         let right = found(&Cosine, &descriptors, 5, MOST_ROWS);
         let some = found(&Cosine, &descriptors, 5, 0);
-        let lists = some.iter().zip(&right);
-        let in_both = lists.map(|(found, right)| {
-            right.iter().filter(|right| found.iter().any(|found| found.1 == right.1)).count()
-        });
-        let n_both: usize = in_both.sum();
-        let recall = n_both as f64 / right.iter().map(Vec::len).sum::<usize>() as f64;
+        let is_found = |at: usize, slot: u32| some[at].iter().any(|found| found.1 == slot);
+        let n_both = |at: usize| right[at].iter().filter(|right| is_found(at, right.1)).count();
+        let n_all = right.concat().len();
+        let recall = (0..right.len()).map(n_both).sum::<usize>() as f64 / n_all as f64;
         assert!(recall >= 0.9, "{recall}");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
         assert_eq!(pool.install(|| found(&Cosine, &descriptors, 5, 0)), some);

@@ -17,10 +17,7 @@ const MOST: usize = 1 << 13;
 /// deviations above the mean, averaged over both rows. Mean and deviation are those of a row's best scores over all reaches. Scores are
 /// symmetric; 0 between a descriptor and itself.
 ///
-/// The largest of a pair's [`REACHES`] scores is the one that [`Overlap`](super::Overlap) starts its walk from; which one is the
-/// largest depends on the distance of the patches. Deviations are those among the given descriptors. For a part of a larger
-/// set, `usual` gives the mean and deviation of each descriptor's scores with all of the larger set ([`usual`](usual())),
-/// because within a part of similar descriptors scores are higher.
+/// For a part of a larger set, whose scores are higher, `usual` gives the mean and deviation in the larger set ([`usual`](usual())).
 ///
 /// # Errors
 /// When there are fewer than two descriptors or more than 8,192, or `usual` has another number of entries.
@@ -31,7 +28,15 @@ pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<
     Error::check_len("dense scores", n_usual, n, " means and deviations")?;
     let mut scores = raw(descriptors);
     let usual = usual.map_or_else(|| within(&scores, n), <[_]>::to_vec);
-    standardize(&mut scores, &usual);
+    scores.par_chunks_mut(n).enumerate().for_each(|(at, line)| {
+        let row = at % n;
+        for (column, score) in line.iter_mut().enumerate() {
+            // A blank descriptor has a deviation of 0.
+            let [own, others] = [usual[row], usual[column]]
+                .map(|(mean, deviation)| (f64::from(*score) - mean) / deviation.max(1e-9));
+            *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
+        }
+    });
     Ok(scores)
 }
 
@@ -100,36 +105,18 @@ fn all_pairs<L: Likeness>(
 /// Returns mean and deviation of each row's scores with the others, by the best of all reaches.
 fn within(scores: &[f32], n: usize) -> Vec<(f64, f64)> {
     let reaches = scores.len() / (n * n);
-    (0..n)
-        .into_par_iter()
-        .map(|row| {
-            let (mut sum, mut squares) = (0.0f64, 0.0f64);
-            for column in (0..n).filter(|&column| column != row) {
-                let of = |reach: usize| scores[(reach * n + row) * n + column];
-                let best = f64::from((0..reaches).map(of).fold(f32::NEG_INFINITY, f32::max));
-                sum += best;
-                squares += best * best;
-            }
-            let others = (n - 1) as f64;
-            let mean = sum / others;
-            (mean, (squares / others - mean * mean).max(0.0).sqrt())
-        })
-        .collect()
-}
-
-fn standardize(scores: &mut [f32], usual: &[(f64, f64)]) {
-    let n = usual.len();
-    scores.par_chunks_mut(n).enumerate().for_each(|(at, line)| {
-        let row = at % n;
-        let (mean, deviation) = usual[row];
-        for (column, score) in line.iter_mut().enumerate() {
-            let (other_mean, other_deviation) = usual[column];
-            // A blank descriptor has a deviation of 0.
-            let own = (f64::from(*score) - mean) / deviation.max(1e-9);
-            let others = (f64::from(*score) - other_mean) / other_deviation.max(1e-9);
-            *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
+    let of_row = |row: usize| {
+        let (mut sum, mut squares) = (0.0f64, 0.0f64);
+        for column in (0..n).filter(|&column| column != row) {
+            let of = |reach: usize| scores[(reach * n + row) * n + column];
+            let best = f64::from((0..reaches).map(of).fold(f32::NEG_INFINITY, f32::max));
+            sum += best;
+            squares += best * best;
         }
-    });
+        let mean = sum / (n - 1) as f64;
+        (mean, (squares / (n - 1) as f64 - mean * mean).max(0.0).sqrt())
+    };
+    (0..n).into_par_iter().map(of_row).collect()
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! The source `geometric`: neighborhoods from tomography of the records alone, without descriptors.
 //!
-//! Chelani et al. (CVPR 2021) list neighbors by distances between lines. An attacker can use the estimates of tomography: many lines
-//! pass close to each other, but two estimates are rarely close by chance.
+//! Chelani et al. (CVPR 2021) list by distances between lines. Many lines pass each other closely, but few estimates are close by chance.
 
 use rayon::prelude::*;
 
@@ -16,16 +15,13 @@ use crate::{Error, RecordId, RowOrder};
 
 /// Estimates searched per listed record: some belong to the same record, and some records pass too far away.
 const LOOK: usize = 3;
-/// Largest number of estimates searched per listed record. Only coinciding estimates of rays of one center need that many, as
-/// these may not list each other.
+/// Largest number of estimates searched per listed record: coinciding estimates of rays of one center may not list each other.
 const MOST_LOOKED: usize = 64 * LOOK;
 
-/// Lists, per slot, the `k` records most likely to hide points near its own. The score is the negative distance between estimates
-/// plus the distance from the estimate to the record (where known), in units of the resolution. The list of a slot without an estimate
-/// is empty.
+/// Lists, per slot, the `k` records most likely to hide points near its own; none without an estimate. The score is the negative distance
+/// between estimates plus the distance from the estimate to the record (where known), in units of the resolution.
 ///
-/// The slots of a paired line get the lists of its two estimates in their order along the line, because it is unknown which
-/// descriptor belongs to which. Rays list only rays of other centers, because rays of one center are no evidence for each other.
+/// The slots of a paired line get the lists of its two estimates in their order along the line. Rays list only rays of other centers.
 ///
 /// The cost is that of tomography (linear in the records) and of nearest neighbors of points.
 ///
@@ -33,7 +29,7 @@ const MOST_LOOKED: usize = 64 * LOOK;
 /// When `k` is 0, the map is not in three dimensions, or its records alone give no positions (planes, rays of one center).
 pub fn geometric<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
     check(released, k)?;
-    geometric_by(released, k, &tomography(released))
+    geometric_by(released, k, &tomography(released).unwrap_or_default())
 }
 
 /// The function [`geometric`] as a source.
@@ -68,9 +64,6 @@ impl Source<3> for Geometric {
 }
 
 /// Makes the lists of [`geometric`] from given estimates of tomography.
-///
-/// # Errors
-/// When [`geometric`] fails.
 pub(crate) fn geometric_by<const D: usize>(
     released: &Released<D>,
     k: usize,
@@ -81,11 +74,11 @@ pub(crate) fn geometric_by<const D: usize>(
     let known = peaks.of.iter().enumerate();
     let known = known.filter_map(|(slot, peak)| Some((slot, widen(&peak.as_ref()?.position))));
     let (slots, positions): (Vec<usize>, Vec<[f64; 3]>) = known.unzip();
-    let mut rows: Vec<Vec<(f32, RecordId)>> = vec![Vec::new(); peaks.of.len()];
-    if positions.is_empty() {
+    let mut rows: Vec<Vec<(f32, RecordId)>> = vec![Vec::new(); released.n_slots()];
+    // There may be no positions at all.
+    let Ok(knn) = Knn::new(&positions) else {
         return Neighborhoods::scored(rows, released, RowOrder::Either);
-    }
-    let knn = Knn::new(&positions)?;
+    };
     let per_record = released.slots_per_record();
     let near = |scratch: &mut Vec<(f64, u32)>, at: usize| {
         let own = RecordId::from_index(slots[at] / per_record);
@@ -142,11 +135,9 @@ fn check<const D: usize>(released: &Released<D>, k: usize) -> Result<(), Error> 
 
 /// Returns the distance from `x` to the line of a record; 0 for axis candidates, which have three lines.
 fn distance_to<const D: usize>(released: &Released<D>, record: RecordId, x: &[f64; 3]) -> f64 {
-    let Some((through, direction)) = released.obfuscation().line(record.index()) else {
-        return 0.0;
-    };
+    let Some(line) = released.obfuscation().line(record.index()) else { return 0.0 };
     let [through, direction] =
-        [through, direction].map(|v| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) });
+        [line.0, line.1].map(|v| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) });
     let t = dot(&sub(x, &through), &direction);
     distance(x, &along(&through, t, &direction))
 }

@@ -8,8 +8,7 @@ use crate::{About, Descriptors, RecordId};
 
 /// Lists that a source has made from the descriptors of a map alone.
 ///
-/// Schemes with one slot per record release the same descriptors, each in a random order. Sources that read nothing else order rows by
-/// content, so their lists for these maps are equal up to the numbers of records.
+/// Schemes with one slot per record release the same descriptors in random order, so such lists are equal up to the numbers of records.
 #[derive(Clone, Debug)]
 pub struct KeptLists {
     descriptors: Descriptors,
@@ -59,7 +58,6 @@ impl KeptLists {
 pub(super) struct Rankings {
     pub(super) descriptors: Descriptors,
     pub(super) slots: Vec<u32>,
-    /// Largest number of partners per row and set.
     pub(super) n_best: usize,
     /// By untrained scores, in standard deviations.
     pub(super) untrained: Vec<Ranked>,
@@ -68,7 +66,6 @@ pub(super) struct Rankings {
 }
 
 impl Rankings {
-    /// Returns whether `rows` have these descriptors, in this order.
     pub(super) fn are_of(&self, rows: &Rows<'_>, n_best: usize) -> bool {
         let mut pairs = self.slots.iter().zip(&rows.slots);
         (self.n_best, self.slots.len()) == (n_best, rows.len())
@@ -76,7 +73,6 @@ impl Rankings {
     }
 }
 
-/// Whether two rows hold the same values.
 pub(super) fn are_equal((a, i): (&Descriptors, u32), (b, j): (&Descriptors, u32)) -> bool {
     let row = |at: u32| at as usize * a.dim()..(at as usize + 1) * a.dim();
     match (a.values(), b.values()) {

@@ -82,8 +82,7 @@ pub(crate) fn comparable<'a>(sets: &[&'a Descriptors]) -> Vec<Cow<'a, Descriptor
 
 /// Returns whether SIFT descriptors lack RootSIFT's square root.
 ///
-/// SIFT cuts values at a fifth of the norm, so that the largest value of a row is a fifth or more. In Castle, Fountain, RedKitchen
-/// and their photos this holds for all rows without the root, and for 34 to 78 % of the rows with it.
+/// SIFT cuts values at a fifth of the norm: without the root, the largest value of a row is a fifth or more.
 fn lacks_root(descriptors: &Descriptors) -> bool {
     let is_below = |row: &Vec<f32>| {
         let largest = row.iter().copied().fold(0.0, f32::max);

@@ -1,7 +1,6 @@
 //! Neighborhoods: per slot, records that are likely to hide points near the slot's point.
 //!
-//! The oracle makes them from the originals, for experiments. A [`Source`] makes them from a released map, as an attacker can.
-//! [`sources::SOURCES`] lists the sources of this crate.
+//! The oracle makes them for experiments, a [`Source`] from a released map. [`sources::SOURCES`] lists the sources of this crate.
 
 mod bearings;
 mod compare;

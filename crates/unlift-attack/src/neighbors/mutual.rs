@@ -9,7 +9,6 @@ use super::similarity::{Cosine, Units};
 use crate::Descriptors;
 use crate::simd::{self, BLOCK, Kernel};
 
-/// Columns that are compared at once.
 const LANES: usize = 16;
 /// Blocks of rows that one thread compares at once.
 const ROW_BLOCKS: usize = 8;
@@ -41,7 +40,6 @@ impl Nearest {
     }
 }
 
-/// Descriptors in blocks, ready to be compared.
 pub(crate) struct Blocks {
     blocks: Vec<Units>,
     len: usize,
@@ -81,7 +79,9 @@ fn compare(
 ) -> (Vec<Nearest>, Vec<Nearest>) {
     let mut scores = vec![0.0f32; BLOCK * BLOCK];
     let mut rows = vec![Nearest::NONE; (n_rows - first * BLOCK).min(part.len() * BLOCK)];
-    let mut columns = Columns::new(b.blocks.len() * BLOCK);
+    let least = vec![f32::NEG_INFINITY; b.blocks.len() * BLOCK];
+    let at = vec![u32::MAX; least.len()];
+    let mut columns = Columns { at, first: least.clone(), second: least };
     for (i, (own, rows)) in part.iter().zip(rows.chunks_mut(BLOCK)).enumerate() {
         for (j, other) in b.blocks.iter().enumerate() {
             Cosine.scores(own, other, &mut scores);
@@ -104,32 +104,9 @@ struct Columns {
     second: Vec<f32>,
 }
 
-impl Columns {
-    fn new(n: usize) -> Self {
-        let least = || vec![f32::NEG_INFINITY; n];
-        Self { at: vec![u32::MAX; n], first: least(), second: least() }
-    }
-
-    /// Adds the scores of row `at` with the columns from `column` on. Free of branches, so that it is vectorized.
-    #[inline(always)]
-    fn keep(&mut self, column: usize, scores: &[f32; LANES], at: u32) {
-        let to = column..column + LANES;
-        let (best, first) = (&mut self.at[to.clone()], &mut self.first[to.clone()]);
-        let second = &mut self.second[to];
-        for l in 0..LANES {
-            let (score, old) = (scores[l], first[l]);
-            let low = if score > old { old } else { score };
-            best[l] = if score > old { at } else { best[l] };
-            first[l] = if score > old { score } else { old };
-            second[l] = if low > second[l] { low } else { second[l] };
-        }
-    }
-}
-
 /// Adds the scores of a block to its rows and columns.
 struct Keep<'a> {
     scores: &'a [f32],
-    /// First row of the block.
     at: usize,
     /// The columns of the block. The last block has places without descriptors.
     others: Range<usize>,
@@ -146,9 +123,18 @@ impl Kernel for Keep<'_> {
         for (r, (scores, best)) in scores.chunks_exact(BLOCK).zip(rows).enumerate() {
             let mut top = [f32::NEG_INFINITY; LANES];
             for (c, scores) in scores.as_chunks::<LANES>().0.iter().enumerate() {
-                columns.keep(others.start + c * LANES, scores, (at + r) as u32);
+                let to = others.start + c * LANES..others.start + (c + 1) * LANES;
+                let (nearest, first) =
+                    (&mut columns.at[to.clone()], &mut columns.first[to.clone()]);
+                let second = &mut columns.second[to];
+                // Free of branches, so that it is vectorized.
                 for l in 0..LANES {
-                    top[l] = if scores[l] > top[l] { scores[l] } else { top[l] };
+                    let (score, old) = (scores[l], first[l]);
+                    let low = if score > old { old } else { score };
+                    nearest[l] = if score > old { (at + r) as u32 } else { nearest[l] };
+                    first[l] = if score > old { score } else { old };
+                    second[l] = if low > second[l] { low } else { second[l] };
+                    top[l] = if score > top[l] { score } else { top[l] };
                 }
             }
             // Few blocks have one of the two nearest of a row.

@@ -3,8 +3,7 @@
 use crate::released::Released;
 use crate::{About, Error, RecordId, RowOrder};
 
-/// Per slot, the records that are said to hide its neighbors. They ascend by record id, because an order by distance would reveal more
-/// than a set. The source and the fraction of true neighbors are not stored, as the attacker does not have them. The
+/// Per slot, the records that are said to hide its neighbors, by record id, because an order by distance would reveal more than a set. The
 /// released map and the order of rows are stored, because positions made from lists are meaningless without them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Neighborhoods {
@@ -15,8 +14,7 @@ pub struct Neighborhoods {
 }
 
 impl Neighborhoods {
-    /// Creates lists for all slots of a map with `n_records` records. Slot `s` has `records[offsets[s]..offsets[s + 1]]`, which is
-    /// sorted here, with optional `scores`.
+    /// Creates lists for all slots of a map with `n_records` records. Slot `s` has `records[offsets[s]..offsets[s + 1]]`, in any order.
     ///
     /// # Errors
     /// When the offsets do not partition `records`, a record is out of range, twice in a list or the slot's own, a score is
@@ -33,10 +31,8 @@ impl Neighborhoods {
             let expected = format!("{n_slots} slots, as the released map has");
             return Err(Error::new("neighborhoods", expected, offsets.len().saturating_sub(1)));
         }
-        if offsets[0] != 0
-            || offsets[n_slots] != records.len() as u64
-            || offsets.windows(2).any(|w| w[0] > w[1])
-        {
+        let ends = (offsets[0], offsets[n_slots]);
+        if ends != (0, records.len() as u64) || !offsets.is_sorted() {
             let expected = format!("ascending from 0 to {}", records.len());
             return Err(Error::new("neighborhood offsets", expected, "another sequence"));
         }
@@ -49,8 +45,21 @@ impl Neighborhoods {
         }
         for slot in 0..n_slots {
             let range = offsets[slot] as usize..offsets[slot + 1] as usize;
-            sort_row(&mut records[range.clone()], scores.as_mut().map(|s| &mut s[range.clone()]));
-            check_row(slot, &records[range], n_records, slots_per_record)?;
+            let row = &mut records[range.clone()];
+            sort_row(row, scores.as_mut().map(|scores| &mut scores[range]));
+            let wrong = |expected: String, found: String| {
+                Err(Error::new(format!("neighborhood of slot {slot}"), expected, found))
+            };
+            if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
+                return wrong("each record once".into(), format!("record {} twice", pair[0].0));
+            }
+            if let Some(last) = row.last().filter(|last| last.index() >= n_records) {
+                return wrong(format!("records below {n_records}"), last.0.to_string());
+            }
+            let own = RecordId::from_index(slot / slots_per_record);
+            if row.binary_search(&own).is_ok() {
+                return wrong("other records".into(), format!("its own record {}", own.0));
+            }
         }
         Ok(Self { offsets, records, scores, about: About::default() })
     }
@@ -134,43 +143,12 @@ impl Neighborhoods {
     }
 }
 
-/// Rejects a sorted list with a record twice, out of range, or the slot's own.
-fn check_row(
-    slot: usize,
-    row: &[RecordId],
-    n_records: usize,
-    slots_per_record: usize,
-) -> Result<(), Error> {
-    let what = || format!("neighborhood of slot {slot}");
-    if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
-        let found = format!("record {} twice", pair[0].0);
-        return Err(Error::new(what(), "each record once", found));
-    }
-    if let Some(last) = row.last()
-        && last.index() >= n_records
-    {
-        let expected = format!("records below {n_records}");
-        return Err(Error::new(what(), expected, last.0));
-    }
-    let own = RecordId::from_index(slot / slots_per_record);
-    if row.binary_search(&own).is_ok() {
-        return Err(Error::new(what(), "other records", format!("its own record {}", own.0)));
-    }
-    Ok(())
-}
-
-/// Sorts a list by record, together with its scores.
 fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
-    match scores {
-        None => records.sort_unstable(),
-        Some(scores) => {
-            let mut both: Vec<(RecordId, f32)> =
-                records.iter().copied().zip(scores.iter().copied()).collect();
-            both.sort_by_key(|&(record, _)| record);
-            for (at, (record, score)) in both.into_iter().enumerate() {
-                records[at] = record;
-                scores[at] = score;
-            }
-        }
+    let Some(scores) = scores else { return records.sort_unstable() };
+    let mut both: Vec<(RecordId, f32)> =
+        records.iter().copied().zip(scores.iter().copied()).collect();
+    both.sort_by_key(|&(record, _)| record);
+    for (at, both) in both.into_iter().enumerate() {
+        (records[at], scores[at]) = both;
     }
 }

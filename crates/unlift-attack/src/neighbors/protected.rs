@@ -12,7 +12,6 @@ use crate::simd::BLOCK;
 pub struct Shared {
     m: usize,
     gain: f64,
-    /// Estimated frequency of each word.
     frequency: Vec<f64>,
 }
 

@@ -34,24 +34,17 @@ pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
     slots
 }
 
-/// Descriptor rows sorted by content. So sums and ties do not depend on the order of the released map: permuting its records permutes
-/// its lists, except for equal rows.
-#[derive(Debug)]
+/// Descriptor rows sorted by content: permuting the records of a released map permutes its lists, except for equal rows.
 pub struct Rows<'a> {
     /// All descriptors, by slot, as they are compared.
     pub descriptors: Cow<'a, Descriptors>,
-    /// The slot of each row.
     pub slots: Vec<u32>,
-    /// The record of each row.
     pub records: Vec<u32>,
     slots_per_record: usize,
 }
 
 impl<'a> Rows<'a> {
-    /// Creates the rows of a released map, for lists of `k` records.
-    ///
-    /// # Errors
-    /// When the map has no descriptors, `k` is 0, or there are fewer than `k` other records.
+    /// Creates the rows of a released map with descriptors, for lists of `k` records.
     pub fn new<const D: usize>(released: &'a Released<D>, k: usize) -> Result<Self, Error> {
         let descriptors = released.descriptors().ok_or_else(|| {
             Error::new("released map", "descriptors, which this source compares", "none")
@@ -60,10 +53,7 @@ impl<'a> Rows<'a> {
         Ok(Self { descriptors: comparable(&[descriptors]).remove(0), ..rows })
     }
 
-    /// Creates the rows of a released map from a matrix with a row per slot, for lists of `k` records.
-    ///
-    /// # Errors
-    /// When `k` is 0, or there are fewer than `k` other records.
+    /// Creates the rows of a released map from a matrix with a row per slot, for lists of `k` records, of at least one and all others.
     pub fn of_map<const D: usize>(
         descriptors: &'a Descriptors,
         released: &Released<D>,
@@ -93,13 +83,11 @@ impl<'a> Rows<'a> {
         Rows { descriptors: Cow::Borrowed(&self.descriptors), slots, records, slots_per_record: 1 }
     }
 
-    /// Sets another order of slots.
     pub fn reorder(&mut self, slots: Vec<u32>) {
         self.records = records_of(&slots, self.slots_per_record);
         self.slots = slots;
     }
 
-    /// Number of rows.
     pub fn len(&self) -> usize {
         self.slots.len()
     }
@@ -110,9 +98,6 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns lists of `released` with the first `k` records of each row's ranking, `ranked[row]`, best first.
-    ///
-    /// # Errors
-    /// When a ranking contains own records or scores that are not finite.
     pub fn lists<const D: usize>(
         &self,
         released: &Released<D>,

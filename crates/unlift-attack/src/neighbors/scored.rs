@@ -1,9 +1,7 @@
 //! Neighborhoods from a function, such as a network, that scores all pairs within sets of descriptors.
 //!
-//! A map of a few thousand points is one set. A larger map is cut into sets of points that may be near each other by untrained
-//! scores. Every point is in the middle of several sets, and its scores are averaged over them. For SIFT, two short
-//! walks follow, one over the pairs with the best scores, one over the pairs with the best untrained scores, because their errors
-//! differ. Learned descriptors see a large area, so that their scores already are the ranking.
+//! A map of a few thousand points is one set. A larger map is cut into sets of points that may be near each other by untrained scores, and
+//! scores are averaged over sets. For SIFT, two short walks follow, over the pairs with the best scores and with the best untrained scores.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -33,8 +31,7 @@ const MAX_RANKINGS: usize = 3;
 pub struct Part {
     /// One row per point.
     pub descriptors: Descriptors,
-    /// For a part of a map: mean and deviation of each descriptor's similarity to all descriptors of the map
-    /// ([`dense`](super::dense())).
+    /// For a part of a map: mean and deviation of each descriptor's similarity to all of the map ([`dense`](super::dense())).
     pub usual: Option<Vec<(f64, f64)>>,
 }
 
@@ -42,10 +39,9 @@ pub struct Part {
 /// column's point is among the nearest of the row's, up to a constant per row. Scores are finite; those of a point with itself are not read.
 pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
 
-/// Lists the `k` records nearest to each slot by `scores`. For SIFT, lists those that two short walks are most likely to reach, one
-/// over these records and one as in [`Overlap`](super::Overlap). The score is the logarithm of the probability that a record is among
-/// the nearest, or of the discounted probability to be reached; the mean over both ends or walks. Scores of pairs come from
-/// `kept` and are kept there: all calls with it must have the same `scores`.
+/// Lists the `k` records nearest to each slot by `scores`; for SIFT those that two short walks are most likely to reach, over these records
+/// and as in [`Overlap`](super::Overlap). The score is the logarithm of a probability, the mean over both ends or walks. Scores of pairs
+/// come from `kept` and are kept there: all calls with it must have the same `scores`.
 ///
 /// # Errors
 /// When `scores` fails, the map has no descriptors, or it has fewer than `k` other records.
@@ -210,7 +206,6 @@ fn both_ways(ranked: Vec<Ranked>) -> Vec<Ranked> {
     ranked.par_iter().enumerate().map(row).collect()
 }
 
-/// Number of rows of a set.
 const SIZE: usize = 1024;
 /// Number of these that are spread over the map, to give typical scores.
 const USUAL: usize = 256;
@@ -223,14 +218,12 @@ const EDGES: usize = 24;
 
 /// Rows that are scored together.
 struct Set {
-    /// The rows, ascending.
     rows: Vec<u32>,
     /// Whether each row is in the middle of the set.
     inner: Vec<bool>,
 }
 
-/// Grows sets along the best pairs. `ranked` has the partners of each row, best first, with scores in standard deviations. Every row is in
-/// the middle of [`TIMES`] sets.
+/// Grows sets along the best pairs: every row is in the middle of [`TIMES`]. `ranked` has partners, best first, in standard deviations.
 fn around(ranked: &[Ranked]) -> Vec<Set> {
     let n = ranked.len();
     let mut edges = walk::edges(ranked, EDGES);

@@ -11,8 +11,7 @@ use crate::released::Released;
 use crate::simd::{self, BLOCK, Kernel};
 use crate::{Descriptors, Error};
 
-/// Walk over learned descriptors. Most of the most similar are neighbors. More steps find more of the 20 nearest, but fewer of the
-/// very nearest (docs/decisions/sources.md).
+/// Walk over learned descriptors. More steps find more of the 20 nearest, but fewer of the very nearest (docs/decisions/sources.md).
 pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 
 /// Lists the records with the most similar descriptors. The score is the cosine similarity; of a record with two
@@ -21,11 +20,9 @@ pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 /// For learned descriptors, which see a large area around their point, it lists the records that a short walk over the most similar
 /// ones reaches. The score is the logarithm of the discounted probability to be reached.
 ///
-/// Subspaces are compared by the [guess](crate::ProtectedDescriptors::guess) of their descriptors, sets of words by the
-/// likelihood that both contain the word of one descriptor.
+/// Subspaces are compared by the [guess](crate::ProtectedDescriptors::guess), sets of words by the likelihood that they contain one word.
 ///
-/// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, each block of descriptors is compared with the blocks
-/// that have the most similar means.
+/// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, similar blocks of descriptors are compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Similarity;
 
@@ -44,8 +41,7 @@ impl<const D: usize> Source<D> for Similarity {
     }
 
     fn k(&self, released: &Released<D>) -> usize {
-        // An image has fewer keypoints, so that only the first of a ranking are near. The first learned descriptors are mostly true
-        // neighbors, and further ones are farther away.
+        // Of an image's few keypoints or of learned descriptors, only the first of a ranking are near.
         match (D, released.descriptors().is_some_and(are_learned)) {
             (2, true) => 5,
             (2, false) => 10,
@@ -86,7 +82,6 @@ impl<const D: usize> Source<D> for Similarity {
     }
 }
 
-/// Compares descriptors by their cosine.
 pub struct Cosine;
 
 /// Adjacent columns, whose sums fit in registers.
@@ -129,8 +124,7 @@ impl Likeness for Cosine {
     }
 }
 
-/// Product of rows and columns. Values are summed in a fixed order, so that a product does not depend on which of its two rows is
-/// first.
+/// Product of rows and columns, summed in a fixed order, so that it does not depend on which of two rows is first.
 struct Product<'a> {
     rows: &'a [f32],
     columns: &'a [f32],

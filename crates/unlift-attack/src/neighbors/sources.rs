@@ -18,9 +18,7 @@ pub enum Needs {
     Descriptors,
 }
 
-/// Makes lists of near records from what is released. An audit takes `Arc<dyn Source<D>>`;
-/// [`SOURCES`] lists the sources of this crate. What a source has learned elsewhere, such as the
-/// weights of a network, is in its fields.
+/// Makes lists of near records from what is released. An audit takes `Arc<dyn Source<D>>`; [`SOURCES`] lists the sources of this crate.
 pub trait Source<const D: usize>: Debug + Send + Sync {
     /// Name in rows, gates and reports: one word.
     fn name(&self) -> &str;
@@ -60,8 +58,7 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
         }
     }
 
-    /// Returns the lists of [`lists`](Self::lists). A source that compares all descriptors of a map keeps the scores of pairs, for further
-    /// maps with nearly the same descriptors.
+    /// Returns the lists of [`lists`](Self::lists), and keeps the scores of pairs for further maps with nearly the same descriptors.
     ///
     /// # Errors
     /// When [`lists`](Self::lists) fails.

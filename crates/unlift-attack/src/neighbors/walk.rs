@@ -10,17 +10,14 @@ use super::rows::{Ranked, Rows};
 use crate::Error;
 use crate::released::Released;
 
-/// Number of edges per row.
 const EDGES: usize = 6;
 /// The weight of an edge is `exp(SHARPNESS * (z - USUAL))`.
 const SHARPNESS: f64 = 2.0;
 const USUAL: f64 = 3.0;
 /// Least number of partners that a row keeps for the walk.
 pub const CANDIDATES: usize = 64;
-/// Length of a walk.
 #[derive(Clone, Copy, Debug)]
 pub struct Walk {
-    /// Number of steps.
     pub steps: usize,
     /// Weight of each further step.
     pub decay: f64,
@@ -30,9 +27,6 @@ pub struct Walk {
 const WIDEST: usize = 128;
 
 /// Lists the `k` best records of a released map by a likeness, or those that a walk over the best ones reaches.
-///
-/// # Errors
-/// When the rows of a large map cannot be told apart.
 pub fn ranked_by<L: Likeness, const D: usize>(
     likeness: &L,
     mut rows: Rows<'_>,
@@ -66,8 +60,7 @@ pub fn standardized(found: &[Found]) -> Vec<Ranked> {
     (0..found.len()).into_par_iter().map(row).collect()
 }
 
-/// Ranks at most `n_best` rows that a walk from each row reaches, followed by the other rows in `ranked` (standardized scores or log
-/// probabilities, best first). Scores are natural logarithms.
+/// Ranks at most `n_best` rows that a walk from each row reaches, then the others of `ranked`. Scores are natural logarithms.
 pub fn walk(ranked: &[Ranked], record_of: &[u32], n_best: usize, how: Walk) -> Vec<Ranked> {
     let steps = graph(ranked);
     let scratch = || Scratch { at: vec![0.0; ranked.len()], sum: vec![0.0; ranked.len()] };
@@ -86,10 +79,11 @@ pub fn walk(ranked: &[Ranked], record_of: &[u32], n_best: usize, how: Walk) -> V
             // Rows that are not reached rank below all others.
             let lowest = list.last().map_or(0.0, |&(score, _)| score);
             let top = ranked[row].first().map_or(0.0, |&(z, _)| z);
-            let rest = ranked[row]
-                .iter()
-                .filter(|(_, other)| reached.binary_search_by_key(other, |&(row, _)| row).is_err());
-            list.extend(rest.take(missing).map(|&(z, other)| (lowest + z.min(top) - top, other)));
+            let is_new = |&&(_, other): &&(f32, u32)| {
+                reached.binary_search_by_key(&other, |&(row, _)| row).is_err()
+            };
+            let rest = ranked[row].iter().filter(is_new).take(missing);
+            list.extend(rest.map(|&(z, other)| (lowest + z.min(top) - top, other)));
             list
         })
         .collect()
@@ -139,8 +133,7 @@ struct Scratch {
 }
 
 impl Scratch {
-    /// Returns the rows that a walk from `start` reaches, ascending, with the discounted sum of the probabilities to be there after
-    /// 1, 2, ... steps.
+    /// Returns the rows that a walk from `start` reaches, ascending, with the discounted sum of their probabilities after each step.
     fn reached(&mut self, steps: &[Vec<(u32, f64)>], start: usize, how: Walk) -> Vec<(u32, f64)> {
         let mut here = vec![(start as u32, 1.0)];
         let (mut touched, mut ever) = (Vec::new(), Vec::new());
@@ -164,9 +157,9 @@ impl Scratch {
                 here.push((other, probability));
             }
             if here.len() > WIDEST {
-                let by_probability =
-                    |a: &(u32, f64), b: &(u32, f64)| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0));
-                here.select_nth_unstable_by(WIDEST - 1, by_probability);
+                here.select_nth_unstable_by(WIDEST - 1, |a, b| {
+                    b.1.total_cmp(&a.1).then(a.0.cmp(&b.0))
+                });
                 here.truncate(WIDEST);
             }
             // Sums are in row order, independent of pruning.
@@ -174,9 +167,7 @@ impl Scratch {
             discount *= how.decay;
         }
         ever.sort_unstable();
-        ever.into_iter()
-            .map(|row| (row, std::mem::take(&mut self.sum[row as usize])))
-            .filter(|&(_, sum)| sum > 0.0)
-            .collect()
+        let sum = |row: u32| (row, std::mem::take(&mut self.sum[row as usize]));
+        ever.into_iter().map(sum).filter(|&(_, sum)| sum > 0.0).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! The attacks of this crate, from released records and lists to recovered points: the steps in their order.
 
-use crate::density::tomography;
+use crate::density::{Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::baselines::density::published;
 use crate::recover::baselines::ransac::{self, Trials};
@@ -13,14 +13,12 @@ use crate::recover::{anchors, beliefs, confidence, consensus, delta, exact, join
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
 
-/// Number of joint recoveries from known positions, each after the known ones are put back. With eight instead of three, `dcl2d` on
-/// RedKitchen gains less than a point.
+/// Number of joint recoveries from known positions. With eight, `dcl2d` on RedKitchen gains less than a point.
 const ROUNDS: usize = 3;
 
 /// Least mean evidence, in nats, of estimates on rays whose centers have regions: below it they are hardly better than chance.
 const LEAST_EVIDENCE: f64 = 1.5;
 
-/// An attack by one of our solvers.
 struct Attack<'a, const D: usize> {
     released: &'a Released<D>,
     lists: &'a Neighborhoods,
@@ -29,7 +27,7 @@ struct Attack<'a, const D: usize> {
     /// Whether [`Builtin::Joint`] ends after its first step, `consensus`.
     only_starts: bool,
     /// Estimates that stay as they are, per slot; empty if none is known.
-    known: Vec<Option<Estimate<D>>>,
+    known: &'a [Option<Estimate<D>>],
 }
 
 impl<const D: usize> Solver<D> for Builtin {
@@ -68,15 +66,13 @@ fn solve<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
     check(released, lists, options)?;
-    Attack::new(released, lists, options, solver).run()
+    let options = *options;
+    Attack { released, lists, options, solver, only_starts: false, known: &[] }.run()
 }
 
-/// Runs our attacks on the records alone; returns the name and the result of each. They recover nothing from a map of planes, or
-/// of rays from one center.
+/// Runs our attacks on the records alone; returns the name and result of each. Planes and rays from one center yield nothing.
 ///
-/// They read the whole map: a sample of its records is a sparser map, of which less is recovered, so that the baseline would be too low.
-/// The published density attack runs on rays only: on lines it recovered less than tomography on every map and at every
-/// threshold (docs/benchmarks.md), and took four times as long.
+/// Of a sample, less would be recovered. On lines the published attack recovered less than tomography (docs/benchmarks.md).
 ///
 /// # Errors
 /// When `options` are out of range.
@@ -90,22 +86,21 @@ pub fn records_alone<const D: usize>(
     let none = none.with_about(About { order: RowOrder::Either, ..About::default() });
     let mut attacks = Vec::new();
     if matches!(released.obfuscation(), Obfuscation::Rays(_)) {
-        attacks.push((
-            Builtin::Density.name(),
-            peaks::at_peaks(released, &none, &published(released))?,
-        ));
+        let peaks = published(released).unwrap_or_default();
+        attacks.push((Builtin::Density.name(), peaks::at_peaks(released, &none, &peaks)?));
     }
-    let peaks = tomography(released);
+    let peaks = tomography(released).unwrap_or_default();
     attacks.push((Builtin::Tomography.name(), peaks::at_peaks(released, &none, &peaks)?));
     // Planes and rays from one center have no geometric lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
-        let joint = Attack::new(released, &lists, &options, Builtin::Joint).run()?;
+        let (lists, solver) = (&lists, Builtin::Joint);
+        let joint = Attack { released, lists, options, solver, only_starts: false, known: &[] };
+        let recovered = joint.run()?;
         // Delta does not need to be learned twice.
-        let options = RecoverOptions { delta: Delta::Fixed(joint.delta()), ..options };
-        let start = Attack::new(released, &lists, &options, Builtin::Joint);
-        attacks.push(("geometric, consensus", Attack { only_starts: true, ..start }.run()?));
-        attacks.push(("geometric, joint", joint));
+        let options = RecoverOptions { delta: Delta::Fixed(recovered.delta()), ..options };
+        let start = Attack { options, only_starts: true, ..joint }.run()?;
+        attacks.extend([("geometric, consensus", start), ("geometric, joint", recovered)]);
     }
     Ok(attacks)
 }
@@ -123,8 +118,9 @@ pub fn recover_from<const D: usize>(
 ) -> Result<Recovered<D>, Error> {
     check(released, lists, options)?;
     released.fingerprint().expect(known.about().map)?;
-    let known = (0..released.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
-    Attack { known, ..Attack::new(released, lists, options, Builtin::Joint) }.run()
+    let known: Vec<_> = (0..released.n_slots()).map(|slot| known.sure_estimate(slot)).collect();
+    let (known, options, solver) = (&known[..], *options, Builtin::Joint);
+    Attack { released, lists, options, solver, only_starts: false, known }.run()
 }
 
 /// Rejects options out of range, and lists of another map.
@@ -144,21 +140,14 @@ pub(super) fn check<const D: usize>(
     options.check()
 }
 
-impl<'a, const D: usize> Attack<'a, D> {
-    fn new(
-        released: &'a Released<D>,
-        lists: &'a Neighborhoods,
-        options: &RecoverOptions,
-        solver: Builtin,
-    ) -> Self {
-        Self { released, lists, options: *options, solver, only_starts: false, known: Vec::new() }
-    }
-
+impl<const D: usize> Attack<'_, D> {
     fn run(&self) -> Result<Recovered<D>, Error> {
         let Self { released, lists, .. } = *self;
+        let at =
+            |peaks: Option<Peaks>| peaks::at_peaks(released, lists, &peaks.unwrap_or_default());
         match (self.solver, released.obfuscation()) {
-            (Builtin::Density, _) => peaks::at_peaks(released, lists, &published(released)),
-            (Builtin::Tomography, _) => peaks::at_peaks(released, lists, &tomography(released)),
+            (Builtin::Density, _) => at(published(released)),
+            (Builtin::Tomography, _) => at(tomography(released)),
             (_, Obfuscation::Lines(_) | Obfuscation::Rays(_)) => {
                 self.run_on(&LineFamily::new(released, lists))
             }
@@ -195,7 +184,7 @@ impl<'a, const D: usize> Attack<'a, D> {
             estimates
         } else if let Some(graph) = graph.as_ref().filter(|_| !self.only_starts) {
             let problem = Problem::new(family, (lists, graph), delta as f32, seed);
-            let mut estimates = settle(joint(&problem, start(), &self.known));
+            let mut estimates = settle(joint(&problem, start(), self.known));
             for _ in 0..F::RERUNS {
                 estimates = settle(joint(&problem, estimates, &[]));
             }
@@ -203,21 +192,18 @@ impl<'a, const D: usize> Attack<'a, D> {
         } else {
             settle(start())
         };
-        let recovered = Recovered::new(released, lists, &estimates, delta)?.with_trials(trials);
-        let predicted = match &graph {
+        let mut recovered = Recovered::new(released, lists, &estimates, delta)?;
+        recovered.trials = trials;
+        recovered.confidence = match &graph {
             None => Err(Unknown::OtherSolver),
             Some(_) if !self.options.confidence => Err(Unknown::NotAsked),
             Some(graph) => confidence::predict(released, lists, graph, &estimates),
         };
-        match predicted {
-            Ok(confidence) => recovered.with_confidence(confidence),
-            Err(unknown) => Ok(recovered.without_confidence(unknown)),
-        }
+        Ok(recovered)
     }
 }
 
-/// Returns the estimates of all slots after the steps of joint recovery from `start`. Estimates that are `known`, per slot, stay as they
-/// are.
+/// Returns the estimates of all slots after the steps of joint recovery from `start`. Those that are `known` stay as they are.
 fn joint<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
@@ -245,8 +231,7 @@ fn joint<const D: usize, F: Family<D>>(
     if let Some(rays) = family.anchored().filter(|_| known.is_empty()) {
         estimates = anchors::layout::recover(rays, (lists, &graph.listers), estimates);
     }
-    // The likeliest places under the whole lists; or under their entries alone, where what is not listed says too little. Points of
-    // paired lines would lose by beliefs.
+    // The likeliest places under whole lists, or under their entries where the rest says too little. Paired lines would lose by beliefs.
     let with_beliefs = graph.slots_per_record == 1 && lists.scores().is_some();
     restore(match ranking::recover(problem, &estimates) {
         Some(ranked) => ranked,

@@ -1,9 +1,7 @@
 //! Confidence: the probability that an estimate is right, without ground truth.
 //!
-//! Around a right estimate, many of the records that the slot lists are near, and many of those that list the slot. Around a wrong one,
-//! fewer are, by chance or because estimates drifted together. A logistic model turns their numbers into a probability, and two of them
-//! into the scale of the error. Its constants were fitted on synthetic rooms, a cube, clusters and an outdoor scene, never on a real map
-//! (docs/decisions/attack.md).
+//! Around a right estimate, many records that the slot lists are near, and many that list it. A logistic model turns their numbers into a
+//! probability and a scale of the error. It was fitted on synthetic maps only (docs/decisions/attack.md).
 
 use rayon::prelude::*;
 
@@ -29,14 +27,13 @@ const LEAST_FOREIGN: f32 = 0.05;
 /// For lines, paired lines, rays, planes and candidates: the constant term of the probability, and that of the scale.
 const OF_KIND: [(f32, f32); 5] =
     [(-3.268, -2.741), (-6.75, -2.546), (-5.78, -2.245), (-6.443, -1.623), (-5.376, -2.314)];
-/// Weights in the logit of the probability, of the logarithms of: near records that the slot lists; that list the slot; the share of near
-/// entries of near slots; this share of the map; the share of near records from other centers.
+/// Weights in the logit of the logarithms of: near listed records; near listers; their share around near slots; that of the map; other
+/// centers.
 const FOUND: [f32; 5] = [2.494, 0.308, -0.608, -1.07, 1.33];
 /// Weights in the logarithm of the scale, of the logarithms of: all near records; the share of near entries of near slots.
 const SCALE: [f32; 2] = [-0.133, -0.675];
 
-/// Predicts the confidence of every slot that joint recovery, whose graph is `graph`, placed.
-/// Fails where the model was never fitted or tested.
+/// Predicts the confidence of every slot that joint recovery placed. Fails where the model was never fitted or tested.
 pub(super) fn predict<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -168,8 +165,7 @@ fn unknown<const D: usize>(
     }
 }
 
-/// Returns the fraction of rays or planes that equal another one bit for bit: different points hardly ever have equal ones. Other records are
-/// drawn at random, so that coinciding points do not have equal lines or candidates.
+/// Returns the fraction of rays or planes that equal another one, as different points hardly do. Other records are drawn at random.
 fn twins<const D: usize>(obfuscation: &Obfuscation<D>) -> f64 {
     let mut rows: Vec<(u8, [u32; D])> = match obfuscation {
         Obfuscation::Rays(rays) => {

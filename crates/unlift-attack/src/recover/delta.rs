@@ -1,9 +1,7 @@
 //! The automatic choice of delta: the length at which consensus agrees least probably by chance.
 //!
-//! Consensus solves a sample of slots for a geometric ladder of deltas that starts at the extent of the records. At a small delta
-//! chance agreement is rare but true neighbors are lost; at a large one everything agrees. The score of a delta is the mean evidence
-//! minus the mean evidence of the same slots with mixed lists, made of entries of other slots' lists. Both means contain the
-//! effects of the number of places tried and of uneven density.
+//! Consensus solves a sample of slots for a geometric ladder of deltas. The score of a delta is the mean evidence minus that with mixed
+//! lists, made of other slots' entries, which contains the effect of uneven density, too.
 
 use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
@@ -12,9 +10,7 @@ use crate::recover::map::{CHUNK, Family, mixed, trimmed_box};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
-/// Least delta within known bounds, as a fraction of the spacing of points. A fifth of the keypoints of an image coincide with
-/// another, and coordinates may be integers: such records agree exactly, so that the evidence of a few slots keeps growing as
-/// delta shrinks.
+/// Least delta within known bounds, as a fraction of the spacing of points: coinciding keypoints agree exactly, whatever delta is.
 const LEAST_DELTA: f64 = 0.25;
 /// The bounds along an axis are ignored if they are this many times as long as the range of most points.
 const TOO_LARGE: f64 = 1.5;
@@ -22,8 +18,7 @@ const TOO_LARGE: f64 = 1.5;
 const ANCHOR_DELTA: f64 = 1.75;
 /// Halvings of the extent in the coarse ladder: down to 1 / 16,384 of it.
 const HALVINGS: u32 = 14;
-/// Halvings in the coarse ladder below the first delta that is not too wide: a center far from all points makes the extent of
-/// rays arbitrarily large.
+/// Halvings in the coarse ladder below the first delta that is not too wide: a far center makes the extent of rays arbitrarily large.
 const HALVINGS_NOT_TOO_WIDE: u32 = 5;
 /// Steps per octave of the fine ladder. The maximum is flat, so finer steps do not help.
 const FINE: i32 = 3;
@@ -39,12 +34,10 @@ const LOWEST: i32 = 15;
 const BEYOND_EDGE: f64 = 2.25;
 /// Largest narrow delta for lists with scores, whose wrong entries have similar descriptors.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
-/// If the likely delta of candidates is more than this many times as wide as the chosen one, the likely one is taken. Partners of exchanges
-/// agree exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices the choice is arbitrary.
+/// If the likely delta of candidates is this many times as wide, it is taken: partners agree exactly, so that evidence hardly falls.
 const COLLAPSED: f64 = 4.0;
 
-/// Chooses delta for `released` as `family`, in the unit of the map. Consensus reads `used`: the lists as `given`, or those of
-/// both directions. With `sharp`, it chooses a narrow delta, for joint recovery.
+/// Chooses delta, in the unit of the map, from lists as `given` and as `used` (in both directions); with `sharp`, for joint recovery.
 pub(super) fn learn<const D: usize, F: Family<D>>(
     released: &Released<D>,
     family: &F,
@@ -56,10 +49,7 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
     if family.anchored().is_some() {
         return ANCHOR_DELTA * spacing;
     }
-    let beyond_edge = match given.scores().is_some() {
-        true => BEYOND_EDGE_OF_SCORED,
-        false => BEYOND_EDGE,
-    };
+    let beyond_edge = given.scores().map_or(BEYOND_EDGE, |_| BEYOND_EDGE_OF_SCORED);
     let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
     let share = per_list / released.n_records().max(1) as f64;
     // The bounds of a map may be far wider than its points, so that the share limits delta.
@@ -71,8 +61,7 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
     if COLLAPSED * chosen < likely { likely } else { chosen }
 }
 
-/// Returns the spacing of points spread evenly over the known bounds, or else over all regions; 0 without both. Axis candidates
-/// publish coordinates, which show whether the bounds are much larger than the range of the points.
+/// Returns the spacing of points spread evenly over the known bounds (or what axis candidates fill of them), or over all regions; else 0.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     let of_regions = || {
         let regions = released.obfuscation().rays()?.regions()?;
@@ -94,9 +83,8 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     libm::pow(volume / released.n_slots().max(1) as f64, 1.0 / D as f64)
 }
 
-/// Returns the delta with the best score, at least `least`; `None` for an empty map or one without extent. A list holds the
-/// fraction `share` of all records. The maximum is a plateau. By default the widest delta of it is taken, whose larger support is
-/// more stable; with `beyond_edge`, a narrow one, at most that many times its lower edge, because joint recovery sharpens it.
+/// Returns the delta with the best score, at least `least`; `None` for a map without extent. A list holds the fraction `share` of all
+/// records. Of the plateau it takes the widest delta; with `beyond_edge`, a narrow one, at most that many times its lower edge.
 fn choose<const D: usize, F: Family<D>>(
     family: &F,
     (lists, slots_per_record): (&Neighborhoods, usize),
@@ -110,12 +98,9 @@ fn choose<const D: usize, F: Family<D>>(
     // Keep some steps of the ladder between the two limits.
     let too_narrow = narrow.min(too_wide / 8.0);
     // In a flat map two of the three lines of a record run within the plane.
-    let too_wide = match family.radius_if_flat(share) {
-        Some(radius) => too_wide.max(chance(radius)),
-        None => too_wide,
-    };
+    let if_flat = family.radius_if_flat(share).map_or(0.0, chance);
     // If points are sparse, keep at least one halving between the two limits.
-    let too_wide = too_wide.max(chance(2.0 * least));
+    let too_wide = too_wide.max(if_flat).max(chance(2.0 * least));
     let extent = family.extent();
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
@@ -158,17 +143,13 @@ fn choose<const D: usize, F: Family<D>>(
     let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
     let Some(beyond_edge) = beyond_edge else { return Some(high) };
     let across = low * libm::pow(high / low, F::ACROSS);
-    Some(match F::KEEPS_NEAR_EDGE {
-        true => across.min(beyond_edge * edge(coarse, &value).max(least)),
-        false => across,
-    })
+    let near_edge = F::KEEPS_NEAR_EDGE.then(|| beyond_edge * edge(coarse, &value).max(least));
+    Some(near_edge.map_or(across, |near_edge| across.min(near_edge)))
 }
 
-/// Returns the lower edge of the plateau: where evidence begins to fall as delta shrinks below `coarse`, the best of the coarse
-/// ladder.
+/// Returns the lower edge of the plateau: where evidence begins to fall as delta shrinks below `coarse`, the best of its ladder.
 ///
-/// Wrong entries of the same region keep evidence large up to deltas many times the distance of true neighbors. They raise the
-/// upper part of the plateau, but not its lower edge.
+/// Wrong entries of the same region raise the upper part of the plateau, but not its lower edge.
 fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
     let at = |step: i32| coarse * libm::exp2(f64::from(-step) / f64::from(FINE));
     let mut values: Vec<f64> = (-FINE..=0).map(|step| value(at(step))).collect();
@@ -184,7 +165,6 @@ fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
     at(LOWEST)
 }
 
-/// Returns the slots of some chunks, in ascending order.
 fn sample(n_slots: usize, n_chunks: usize, seed: u64) -> Vec<usize> {
     let all = n_slots.div_ceil(CHUNK);
     let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);

@@ -11,8 +11,7 @@ use crate::released::Released;
 
 /// Returns the points at `peaks`.
 ///
-/// Lists do not change positions. For paired lines they decide which of the two positions belongs to which slot: the cheaper
-/// assignment wins, with the distances to the listed records (Eq. (4)) as cost. With empty lists the order is that along the line.
+/// Lists decide which of the two positions of a paired line belongs to which slot, by the distances to the listed records (Eq. (4)).
 pub(super) fn at_peaks<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -21,7 +20,7 @@ pub(super) fn at_peaks<const D: usize>(
     let rows = rows_of(released, None);
     // Delta is the resolution of the peaks.
     let delta = if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 };
-    let peak = |slot: usize| match peaks.of[slot] {
+    let peak = |slot: usize| match peaks.of.get(slot).copied().flatten() {
         // These attacks return positions in three dimensions only.
         Some(Estimate { position, axis, evidence, .. }) => {
             Estimate::at(std::array::from_fn(|c| position[c % 3]), 0, axis.into(), evidence)
@@ -29,11 +28,8 @@ pub(super) fn at_peaks<const D: usize>(
         None => Estimate::lost(Status::NoSupport),
     };
     let distances = |slot: usize, x: [f32; D]| {
-        let rows = &rows;
-        lists.of(slot).iter().map(move |record| {
-            let row = &rows[record.index()];
-            row.distance2(&x, row.along(&x)).sqrt()
-        })
+        let rows = lists.of(slot).iter().map(|record| &rows[record.index()]);
+        rows.map(move |row| row.distance2(&x, row.along(&x)).sqrt())
     };
     let cost = |at: usize, slot: usize| distances(slot, peak(at).position).sum::<f32>();
     let place = |slot: usize| {

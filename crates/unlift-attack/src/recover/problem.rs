@@ -15,7 +15,6 @@ pub(super) struct Problem<'a, const D: usize, F: Family<D>> {
     pub(super) delta: f32,
     pub(super) at_delta: F::AtDelta,
     pub(super) seed: u64,
-    /// How many edges lead to each record.
     pub(super) listed: Vec<u32>,
     /// Evenly spaced slots from which the distribution of true neighbors is learned.
     pub(super) sample: Vec<Sampled>,

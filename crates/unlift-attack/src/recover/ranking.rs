@@ -1,20 +1,15 @@
-//! Ranking: positions under which the whole lists are likeliest, not only their entries.
+//! Ranking: positions under which the whole lists are likeliest, not only their entries (docs/decisions/attack.md).
 //!
-//! A list of the K nearest also says which records are *not* among them: if it has record `j` and not record `k`, then `j` is
-//! nearer than `k`. Joint recovery uses the entries only, so inside a ball of K neighbors all places look alike to it. Ranking
-//! starts from its estimates and uses both, in both directions. For a slot `i` at `x`, let `R_i` be the distance to the K-th
+//! A list of the K nearest also says which records are *not* among them. For a slot `i` at `x`, let `R_i` be the distance to the K-th
 //! nearest estimate, corrected at each place by the number of estimates within it, and `d` the distance to the estimate of record `j`. Then
 //!
 //! `P(j is in the list of i) = In f(d / R_i) + q (1 - f(d / R_i))`, with `f(u) = 1 / (1 + exp((u^2 - 1) / (2 s)))` and
 //! `q = (1 - In) K / n`.
 //!
-//! The log-likelihood of slot `i` is the sum of `ln P` over its list and over the slots that list its record, and of `ln(1 - P)`
-//! over the slots nearby that are not listed and over those that do not list its record. An iteration moves each slot along its
-//! record to the likeliest of some places around its estimate. The inlier ratio `In` is estimated from lists and
-//! estimates. Even and odd slots take turns, as in joint recovery.
+//! The log-likelihood of slot `i` is the sum of `ln P` over its list and over the slots that list its record, and of `ln(1 - P)` over the
+//! others nearby. Each iteration moves even, then odd slots along their records to the likeliest of some places.
 //!
-//! Far estimates are as likely at all places, so only those within a few `R_i` count, and each likelihood is divided by that of a far
-//! estimate. Eight places are scored at a time.
+//! Each likelihood is divided by that of a far estimate, so only those within a few `R_i` count. Eight places are scored at a time.
 
 use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
@@ -44,23 +39,20 @@ const PLANE_STEPS: [Lanes; 4] = [
     [0.12, -0.12, 0.06, -0.06, 0.03, -0.03, 0.015, -0.015],
     [0.12, -0.12, 0.06, -0.06, 0.03, -0.03, 0.015, -0.015],
 ];
-/// Listed records near which the first iteration tries places, too, because the estimate may be elsewhere; only above the following
-/// inlier ratio. Below it, such places win by chance too often.
+/// Listed records near which the first iteration tries places, above this inlier ratio: below it, such places win by chance too often.
 const ELSEWHERE: usize = 8;
 /// Steps from such a place, in radii.
 const ELSEWHERE_STEPS: Lanes = [0.0, 0.1, -0.1, 0.2, -0.2, 0.4, -0.4, 0.6];
-/// These places are tried for slots with fewer listed estimates nearby than this fraction of the expected number. Slots with several
-/// pieces always try them, because the piece may be wrong.
+/// These places are tried for slots with several pieces, or with less than this fraction of the expected estimates nearby.
 const LOST: f32 = 0.85;
 const LEAST_ELSEWHERE: f32 = 0.5;
 /// Bounds of the number of estimates within the radius, as a fraction of K. Far from the center, only a part of them is counted.
 const RATIO: (f32, f32) = (0.8, 1.25);
 /// Listed records within this many `R_i` count as true neighbors when the inlier ratio is estimated.
 const REACH: f32 = 1.3;
-/// If this many times as many listed records are within [`FARTHER`] radii as within [`REACH`], wrong entries are near, too, and a record
-/// that is not listed says little: then the estimates of joint recovery are kept. RedKitchen with `near` noise has 1.7 times as many at an
-/// inlier ratio of 0.3, where ranking gains 2 to 9 points, 2.1 at 0.2, where it loses up to 5, and 2.9 at 0.1, where it loses up to 18.
-/// With `uniform` noise it has 1.2 times as many at most.
+/// If this many times as many listed records are within [`FARTHER`] radii as within [`REACH`], wrong entries are near, too, and what is not
+/// listed says little. RedKitchen with `near` noise has 1.7 times as many at an inlier ratio of 0.3, where ranking gains, and 2.1 at 0.2,
+/// where it loses; with `uniform` noise 1.2.
 const MOST_FARTHER: f32 = 1.9;
 const FARTHER: f32 = 2.0;
 /// Bounds of the inlier ratio. No list is taken to be perfect, because estimates are not.
@@ -69,13 +61,10 @@ const INLIER_RATIO: (f32, f32) = (0.05, 0.98);
 const LEAST_LISTS: f32 = 4.0;
 /// Below this inlier ratio, the estimates of joint recovery are kept: Castle at 0.1 would lose up to 4 points within 1.0.
 const LEAST_RATIO: f32 = 0.15;
-/// The limit for lists with scores, which sources make. A choice by descriptors leaves out near points, too, so that a record that is
-/// not listed says little: lists of SIFT maps (0.2) would lose up to 17 points, those of ALIKED maps (0.6) up to 4. Lists of ALIKED images
-/// (0.9) gain up to 20 (docs/decisions/tried.md).
+/// The limit for lists with scores: sources leave out near points, too (docs/decisions/tried.md).
 const LEAST_RATIO_OF_SOURCES: f32 = 0.75;
 
-/// Returns the estimates of all slots after ranking from `start`, those of joint recovery, or `None` if what lists do not name
-/// says too little.
+/// Returns the estimates of all slots after ranking from `start`, or `None` if what lists do not name says too little.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: &[Estimate<D>],
@@ -86,10 +75,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         return None;
     }
     let mut estimates = start.to_vec();
-    let least_ratio = match lists.scores() {
-        None => LEAST_RATIO,
-        Some(_) => LEAST_RATIO_OF_SOURCES,
-    };
+    let least_ratio = lists.scores().map_or(LEAST_RATIO, |_| LEAST_RATIO_OF_SOURCES);
     for iteration in 0..ITERATIONS {
         let mut radius = Vec::new();
         for half in 0..2 {
@@ -103,18 +89,20 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             if half == 0 && (inlier_ratio < least_ratio || farther > MOST_FARTHER * near) {
                 return (iteration > 0).then_some(estimates);
             }
+            // The chance that a wrong entry is a given record.
+            let q = (1.0 - inlier_ratio) * (mean_length / n as f32);
             let context = Context {
                 problem,
                 estimates: &estimates,
                 tree: &tree,
                 slots: &slots,
                 radius: &radius,
-                odds: odds(inlier_ratio, mean_length / n as f32),
+                odds: [(1.0 - inlier_ratio) / (1.0 - q), (inlier_ratio / q).min(LARGEST)],
                 inlier_ratio,
                 iteration,
             };
-            let moves = |&slot: &usize| slot % 2 == half && radius[slot] > 0.0;
-            let moving: Vec<usize> = along_curve(&estimates).into_iter().filter(moves).collect();
+            let mut moving = along_curve(&estimates);
+            moving.retain(|&slot| slot % 2 == half && radius[slot] > 0.0);
             let moved = solve_slots(&context, &moving);
             for (slot, Candidate { x, piece, .. }) in moving.into_iter().zip(moved) {
                 if x.iter().all(|x| x.is_finite()) {
@@ -127,8 +115,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     Some(estimates)
 }
 
-/// Returns, per slot, the distance within which as many estimates lie as its list is long; 0 for slots without estimate or list. The points
-/// of `tree` are the estimates of `slots`.
+/// Returns, per slot, the distance within which as many estimates (those of `slots`) lie as its list is long; else 0.
 fn radii<const D: usize>(tree: &Knn<'_, D>, slots: &[u32], lists: &Neighborhoods) -> Vec<f32> {
     let length = |row: usize| lists.of(slots[row] as usize).len();
     let found =
@@ -146,24 +133,15 @@ fn shares_within<const D: usize, F: Family<D>>(
 ) -> [f32; 2] {
     let (mut within, mut all) = ([0; 2], 0);
     for slot in evenly(estimates.len(), 1 << 12).filter(|&slot| radius[slot] > 0.0) {
-        let bounds = [REACH, FARTHER].map(|times| (times * radius[slot]).powi(2));
         for record in problem.lists.of(slot) {
             let ends = problem.graph.slots_of(record.index());
             let nearest = nearest2(estimates, ends, &estimates[slot].position);
-            for (count, bound) in within.iter_mut().zip(bounds) {
-                *count += usize::from(nearest < bound);
-            }
+            let is_within = |times: f32| usize::from(nearest < (times * radius[slot]).powi(2));
+            within = [within[0] + is_within(REACH), within[1] + is_within(FARTHER)];
             all += 1;
         }
     }
     within.map(|count| count as f32 / all.max(1) as f32)
-}
-
-/// Returns the likelihood ratios of records that are surely within the radius, against records far outside: of one that is no entry, then of
-/// an entry. `by_chance` is the chance that a wrong entry is a given record.
-fn odds(inlier_ratio: f32, by_chance: f32) -> [f32; 2] {
-    let q = (1.0 - inlier_ratio) * by_chance;
-    [(1.0 - inlier_ratio) / (1.0 - q), (inlier_ratio / q).min(LARGEST)]
 }
 
 /// Largest value of `exp`, and of an odds ratio: products of four are finite.
@@ -188,7 +166,6 @@ struct Terms<const D: usize> {
     /// Radius at the center, and the number of estimates within it.
     radius: f32,
     length: f32,
-    /// Differences of the estimates to the center.
     away: Columns<D>,
     terms: Vec<Term>,
     /// Per term, its squared distance to a place, and twice its component along a direction.
@@ -212,8 +189,7 @@ const NOTHING: (Term, f32) =
     (Term { inverse: 0.0, own: 1.0, theirs: 1.0, most: f32::INFINITY }, 1e18);
 
 impl<const D: usize> Terms<D> {
-    /// Returns the log-likelihoods of the places `from + t * direction` at some `t`, where `from` is relative to the center. `length2` is the
-    /// squared length of `direction`.
+    /// Returns the log-likelihoods of the places `from + t * direction` at some `t`. `from` is relative to the center.
     #[inline(always)]
     fn scores(
         &mut self,
@@ -269,15 +245,13 @@ impl<const D: usize> Terms<D> {
     }
 }
 
-/// What an iteration reads.
 struct Context<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
     estimates: &'a [Estimate<D>],
-    /// The estimates of `slots`.
     tree: &'a Knn<'a, D>,
     slots: &'a [u32],
     radius: &'a [f32],
-    /// Likelihood ratios of a record that is no entry and of an entry, see [`odds`].
+    /// Likelihood ratios of records that are surely within the radius, against records far outside: of one that is no entry, and of an entry.
     odds: [f32; 2],
     inlier_ratio: f32,
     iteration: usize,
@@ -358,7 +332,6 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         }
     }
 
-    /// Tries the places of `slot` that are near the estimates of listed records.
     #[inline(never)]
     fn try_elsewhere(&self, slot: usize, best: &mut Candidate<D>, terms: &mut Terms<D>) {
         let Problem { family, lists, graph, seed, .. } = self.problem;
@@ -386,8 +359,8 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     #[inline(always)]
     fn collect(&self, slot: usize, center: usize, terms: &mut Terms<D>) -> usize {
         let Self { problem: Problem { lists, graph, .. }, estimates, radius, odds, .. } = *self;
-        let slots_per_record = graph.slots_per_record;
-        let record = record_of(slot, slots_per_record);
+        let is_paired = graph.slots_per_record == 2;
+        let record = record_of(slot, graph.slots_per_record);
         let place = |slot: usize| &estimates[slot].position;
         let at = place(center);
         let mark = |terms: &mut Terms<D>, to: bool| {
@@ -401,20 +374,19 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         terms.length = lists.of(center).len() as f32;
         terms.terms.clear();
         terms.away.resize(0, 0.0);
-        let partner =
-            (slots_per_record == 2 && estimates[slot ^ 1].is_known()).then(|| place(slot ^ 1));
+        let partner = (is_paired && estimates[slot ^ 1].is_known()).then(|| place(slot ^ 1));
         let reach = f64::from(NEAR * terms.radius);
         let mut n_near = 0;
         self.tree.within(&at.map(f64::from), reach * reach, |row| {
             let other = self.slots[row as usize] as usize;
-            let of = record_of(other, slots_per_record);
+            let of = record_of(other, graph.slots_per_record);
             if of == record {
                 return;
             }
             let x = place(other);
             let is_listed = terms.listed[of];
             // Of the two slots of a listed record, the nearer one is meant.
-            let is_farther = is_listed && slots_per_record == 2 && {
+            let is_farther = is_listed && is_paired && {
                 let (own, other_slot) = (distance2(x, at), distance2(place(other ^ 1), at));
                 other_slot < own || (other_slot == own && other % 2 == 1)
             };

@@ -37,10 +37,8 @@ pub struct Estimate<const D: usize> {
     pub position: [f32; D],
     /// Whether the slot was recovered, or why not.
     pub status: Status,
-    /// Number of records that agree with the position. Consensus: listed records within delta before the last refit (planes: within
-    /// 1.5 delta, summed over the free axes). Joint recovery: records at the ends of the slot's edges with an estimate nearby.
-    /// Later steps move the position only.
-    /// The largest count is 65,535.
+    /// Number of records that agree with the position, at most 65,535. Consensus: listed records within delta before the last refit
+    /// (planes: within 1.5 delta, summed over the free axes). Joint recovery: records at the ends of edges with an estimate nearby.
     pub support: u16,
     /// Axis of the hidden coordinate (axis candidates; else 0).
     pub axis: u8,
@@ -54,7 +52,6 @@ pub(crate) fn stored_support(count: u32) -> u16 {
 }
 
 impl<const D: usize> Estimate<D> {
-    /// Whether the slot has a position.
     #[inline(always)]
     pub(crate) fn is_known(&self) -> bool {
         self.status == Status::Ok
@@ -71,8 +68,6 @@ impl<const D: usize> Estimate<D> {
         Self { position: [f32::NAN; D], status, support: 0, axis: 0, evidence: 0.0 }
     }
 }
-
-// Confidence.
 
 /// The attacker's confidence in the estimate of one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,8 +89,6 @@ impl Confidence {
         if ratio.is_finite() { f64::from(self.found) / (1.0 + ratio * ratio) } else { 0.0 }
     }
 }
-
-// Reasons why confidence is missing.
 
 named! {
     /// Why a recovered map has no [`Confidence`]: in these cases predicted probabilities were wrong or never tested.
@@ -150,8 +143,6 @@ impl Unknown {
     }
 }
 
-// The recovered map.
-
 /// Recovered positions, one row per slot, in columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recovered<const D: usize> {
@@ -164,8 +155,8 @@ pub struct Recovered<const D: usize> {
     evidence: Vec<f32>,
     axis: Option<Vec<u8>>,
     descriptor_row: Option<Vec<u32>>,
-    confidence: Result<Vec<Confidence>, Unknown>,
-    trials: Option<Vec<(u32, u64)>>,
+    pub(super) confidence: Result<Vec<Confidence>, Unknown>,
+    pub(super) trials: Option<Vec<(u32, u64)>>,
     about: About,
 }
 
@@ -210,8 +201,7 @@ impl<const D: usize> Recovered<D> {
         })
     }
 
-    /// Creates the result of your own solver: `positions` relative to the released origin, one per slot. A position that is not
-    /// finite marks a slot that was not recovered.
+    /// Creates the result of your own solver from one position per slot, relative to the released origin. One that is not finite is lost.
     ///
     /// For axis candidates, the hidden axis is the one along which the position is farthest from the published one.
     ///
@@ -240,7 +230,6 @@ impl<const D: usize> Recovered<D> {
         Ok(recovered.without_confidence(Unknown::OtherSolver))
     }
 
-    /// Creates the result of an attack on `released` with `lists`, from one estimate per slot.
     pub(crate) fn new(
         released: &Released<D>,
         lists: &Neighborhoods,
@@ -339,7 +328,6 @@ impl<const D: usize> Recovered<D> {
         self.confidence().map(|rows| rows[slot].probability_within(threshold))
     }
 
-    /// Returns the estimate of `slot` if it is more likely right than wrong.
     pub(crate) fn sure_estimate(&self, slot: usize) -> Option<Estimate<D>> {
         let found = self.confidence()?.get(slot)?.found;
         let axis = self.axis().map_or(0, |axis| axis[slot].into());
@@ -368,19 +356,11 @@ impl<const D: usize> Recovered<D> {
     pub fn trials(&self) -> Option<&[(u32, u64)]> {
         self.trials.as_deref()
     }
-
-    /// Adds the histogram of trials.
-    #[must_use]
-    pub(crate) fn with_trials(self, trials: Option<Vec<(u32, u64)>>) -> Self {
-        Self { trials, ..self }
-    }
 }
 
-/// Per slot, the released descriptor row that belongs to it (supplement B); `None` unless records have two slots and
-/// descriptors.
+/// Per slot, the released descriptor row that belongs to it (supplement B); `None` unless paired lines have descriptors.
 ///
-/// The cheaper of the two assignments wins. The cost of a descriptor and a list is the sum of the distances from the descriptor to
-/// the listed records, each taken to the nearer of the record's two descriptors.
+/// The cheaper assignment wins. Its cost is the sum of the distances from each descriptor to the nearer one of each listed record.
 fn descriptor_rows<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,

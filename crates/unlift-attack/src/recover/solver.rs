@@ -92,23 +92,20 @@ named! {
         /// Our strongest attack: consensus with lists in both directions, then all slots together from the estimates of their neighbors,
         /// last the positions under which the whole lists are likeliest, also by what they do not name, or several weighed places.
         Joint = "joint",
-        /// On each slot's record, the position whose support is least probable by chance. The search is exact, and its cost does not
-        /// depend on the inlier ratio.
+        /// On each slot's record, the position whose support is least probable by chance. The search is exact.
         Consensus = "consensus",
         /// The sampling loop of the paper (section 4), for comparison.
         Ransac = "ransac",
         /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et al. 2024), for comparison.
         /// They recover nothing from planes and axis candidates.
         Density = "density",
-        /// Our strongest attack on the records alone: the density of points that makes the records likeliest, and its peak on each
-        /// record. It recovers nothing from planes.
+        /// Our strongest attack on the records alone: the peak on each record of the density that makes records likeliest. Not on planes.
         Tomography = "tomography",
     }
 }
 
 impl Builtin {
-    /// The solvers that compute positions from lists. The others have no delta, and use lists only to decide which point of a
-    /// paired line belongs to which slot.
+    /// The solvers that compute positions from lists. Others have no delta, and use lists only to order the points of paired lines.
     pub const FROM_LISTS: [Builtin; 3] = [Self::Joint, Self::Consensus, Self::Ransac];
 
     /// Returns the solver called `name`. For one version, two former names are read: `ranking`, which is [`Self::Joint`] now, and

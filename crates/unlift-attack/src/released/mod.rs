@@ -1,7 +1,6 @@
 //! Released maps: the records, which are all that an attacker sees.
 //!
-//! Every family of records stores `f32` columns relative to a published origin in a normal form, so that moving an
-//! original along its own record changes no stored byte.
+//! Records are `f32` columns relative to a published origin. Moving an original along its own record changes no stored byte.
 
 mod records;
 
@@ -65,8 +64,7 @@ impl<const D: usize> Released<D> {
         Ok(Self { fingerprint: bare.hashed(), ..bare })
     }
 
-    /// Returns the first 16 bytes of the SHA-256 of all map data, in normal form and relative to its origin. It covers only what an
-    /// attacker has, so it may be in every file made from the map.
+    /// Returns the first 16 bytes of the SHA-256 of all that an attacker has, in normal form and relative to its origin.
     fn hashed(&self) -> Fingerprint {
         let Self { obfuscation, slots_per_record, origin, unit, bounds, .. } = self;
         let rows = self.protected.as_ref().map(ProtectedDescriptors::rows);
@@ -139,10 +137,7 @@ impl<const D: usize> Released<D> {
     pub fn with_bounds(self, bounds: Option<Bounds<D>>) -> Self {
         let known = self.bounds.is_some() || bounds.is_some();
         let bounded = Self { bounds, ..self };
-        match known {
-            true => Self { fingerprint: bounded.hashed(), ..bounded },
-            false => bounded,
-        }
+        if known { Self { fingerprint: bounded.hashed(), ..bounded } } else { bounded }
     }
 
     /// The box that contains all hidden points, in the map's frame, if it is known.
@@ -185,8 +180,7 @@ impl<const D: usize> Released<D> {
         self.unit
     }
 
-    /// Descriptors, one row per slot, in random order within a record. Of a map with protected ones, these are the attacker's
-    /// [guess](ProtectedDescriptors::guess).
+    /// Descriptors, one row per slot, in random order within a record; of protected ones, the [guess](ProtectedDescriptors::guess).
     pub fn descriptors(&self) -> Option<&Descriptors> {
         self.descriptors.as_ref().or_else(|| Some(self.protected.as_ref()?.guess()))
     }

@@ -66,7 +66,6 @@ impl<const D: usize> Obfuscation<D> {
         }
     }
 
-    /// The rays, if that is the family.
     pub(crate) fn rays(&self) -> Option<&Rays<D>> {
         match self {
             Self::Rays(rays) => Some(rays),
@@ -74,8 +73,7 @@ impl<const D: usize> Obfuscation<D> {
         }
     }
 
-    /// Whether the records are bearings from one center. All meet there, so neighbors say nothing about ranges, but whoever stands in
-    /// the center sees the scene.
+    /// Whether the records are bearings from one center: lists say nothing about ranges, but who stands there sees the scene.
     pub fn is_bearings(&self) -> bool {
         self.rays().is_some_and(|rays| rays.centers.len() == 1)
     }
@@ -276,25 +274,19 @@ impl<const D: usize> AxisCandidates<D> {
     }
 }
 
-/// Returns the rows `order[0], order[1], ...` of one column.
 fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
     order.iter().map(|&row| column[row as usize]).collect()
 }
 
-/// Stored directions whose squared length differs from 1 by less than this stay unchanged, so that normalizing twice changes no bit. The
-/// `f32` rounding of a unit vector stays below it.
+/// Stored directions whose squared length differs from 1 by less stay unchanged, so that normalizing twice changes no bit.
 const UNIT_SLACK: f64 = 6e-7;
 
-/// Whether `v` may come from a stored file. Only then may a normal form keep it; otherwise its last bits would show a length near 1 or
-/// a point near the foot.
+/// Whether `v` may come from a stored file. Otherwise its last bits would show a length near 1 or a point near the foot.
 fn is_f32<const D: usize>(v: &[f64; D]) -> bool {
     v.iter().all(|&x| f64::from(x as f32) == x)
 }
 
 /// Returns the unit vector along `v`; `v` itself if it is a stored unit vector.
-///
-/// # Errors
-/// When `v` is not finite or has no length.
 fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], Error> {
     let norm2: f64 = v.iter().map(|x| x * x).sum();
     if !norm2.is_finite() || norm2 <= 0.0 {
@@ -308,7 +300,6 @@ fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], E
     Ok(v.map(|x| x / norm))
 }
 
-/// Rounds `v` to `f32`; the error names the row.
 fn finite_f32<const D: usize>(v: [f64; D], what: &str, row: usize) -> Result<[f32; D], Error> {
     let rounded = v.map(|x| x as f32);
     if rounded.iter().all(|x| x.is_finite()) {

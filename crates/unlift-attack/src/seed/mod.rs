@@ -1,5 +1,4 @@
-//! Random draws as a function of seed, stage, item and counter. No state passes between items, so work can be split over threads, and
-//! one item can be computed again alone.
+//! Random draws as a function of seed, stage, item and counter, so that work can be split over threads and repeated in part.
 //!
 //! There are two kinds of streams:
 //!

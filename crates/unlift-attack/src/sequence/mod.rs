@@ -1,7 +1,6 @@
 //! Recovery of keypoints from a sequence of protected queries whose poses are known.
 //!
-//! Each query hides its keypoints on its own. A line seen from a known pose is a plane in space, and three planes meet in the point that
-//! the keypoint shows. Links between queries come from descriptors alone; no lists of neighbors are needed.
+//! A line seen from a known pose is a plane, and three planes meet in a point. Links between queries come from descriptors alone.
 //!
 //! ```text
 //! queries, poses ──Links──> tracks ──triangulate──> points ──project──> positions on the records
@@ -20,7 +19,7 @@ use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{distance, dot, median, sub, widen};
 use crate::neighbors::{Blocks, Neighborhoods, comparable, mutual};
 use crate::recover::{Confidence, Estimate, RecoverOptions, Recovered, Status, recover_from};
-use crate::released::{Obfuscation, Released};
+use crate::released::{Obfuscation, Rays, Released};
 use crate::{About, Error, RowOrder, Unit};
 
 /// Cosine of the largest angle between the viewing directions of two queries that are compared: 75 degrees.
@@ -36,45 +35,34 @@ pub struct Query {
 }
 
 impl Query {
-    /// Whether both cameras look in similar directions, so that they can match.
-    fn looks_like(&self, other: &Self) -> bool {
-        dot(&self.camera.pose.rotation[2], &other.camera.pose.rotation[2]) > TURNED
-    }
-
-    /// Back-projects the record of `slot`.
     fn sight(&self, projection: [[f64; 4]; 3], slot: usize) -> Sight {
-        let origin = self.released.origin();
+        let (records, origin) = (self.released.obfuscation(), self.released.origin());
         let record = slot / self.released.slots_per_record();
         let absolute = |p: &[f32; 2]| [0, 1].map(|c| f64::from(p[c]) + origin[c]);
-        let through = |p: [f64; 2], d: &[f32; 2]| {
+        let through = |(p, d): (&[f32; 2], &[f32; 2])| {
             let [x, y] = widen(d);
             let length = dot(&[x, y], &[x, y]).sqrt();
             let normal = [-y / length, x / length];
-            [normal[0], normal[1], -dot(&normal, &p)]
+            [normal[0], normal[1], -dot(&normal, &absolute(p))]
         };
-        let all = self.released.bounds().unwrap_or(EVERYWHERE);
-        match self.released.obfuscation() {
-            Obfuscation::Lines(lines) => {
-                let line = through(absolute(&lines.foot()[record]), &lines.direction()[record]);
-                Sight::new(projection, all, &[line])
-            }
-            Obfuscation::Rays(rays) => {
-                let center = usize::from(rays.center()[record]);
-                let line = through(absolute(&rays.centers()[center]), &rays.direction()[record]);
-                let region = rays.regions().map(|of| of[center].about(&origin.map(|x| -x)));
-                Sight::new(projection, region.unwrap_or(all), &[line])
+        let at = |axis: usize, x: f64| if axis == 0 { [1.0, 0.0, -x] } else { [0.0, 1.0, -x] };
+        let lines: Vec<[f64; 3]> = match records {
+            Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
+                records.line(record).map(through).into_iter().collect()
             }
             Obfuscation::AxisCandidates(candidates) => {
                 let [u, v] = absolute(&candidates.position()[record]);
-                Sight::new(projection, all, &[[1.0, 0.0, -u], [0.0, 1.0, -v]])
+                vec![at(0, u), at(1, v)]
             }
             Obfuscation::AxisPlanes(planes) => {
                 let axis = usize::from(planes.axis()[record]);
-                let at = f64::from(planes.offset()[record]) + origin[axis];
-                let line = if axis == 0 { [1.0, 0.0, -at] } else { [0.0, 1.0, -at] };
-                Sight::new(projection, all, &[line])
+                vec![at(axis, f64::from(planes.offset()[record]) + origin[axis])]
             }
-        }
+        };
+        let region = |rays: &Rays<2>| Some(rays.regions()?[usize::from(rays.center()[record])]);
+        let region = records.rays().and_then(region).map(|of| of.about(&origin.map(|x| -x)));
+        let area = region.or(self.released.bounds()).unwrap_or(EVERYWHERE);
+        Sight::new(projection, area, &lines)
     }
 }
 
@@ -95,7 +83,6 @@ pub struct Solved {
 
 /// Noise with which tracks are first triangulated, in pixels. Shares depend little on it.
 const FIRST_NOISE_PX: f64 = 5.0;
-/// Least noise assumed, in pixels.
 const LEAST_NOISE_PX: f64 = 1.0;
 /// Largest noise assumed, in pixels. With more, every line would agree.
 const MOST_NOISE_PX: f64 = 12.0;
@@ -186,9 +173,8 @@ const SURE: f32 = 0.9;
 /// Lists alone are right if they place a keypoint this near to a sure position, in pixels.
 const NEAR_PX: f64 = 10.0;
 
-/// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found, and `alone`
-/// those that lists alone give. Known positions that are more likely right than wrong, and that are more likely right than those of
-/// lists alone or near them, stay as they are until exact constraints apply. The result has no confidence.
+/// Recovers the keypoints of a query also from its lists of neighbors. `known` has the positions that [`recover`] found, and `alone` those
+/// that lists alone give. Known positions stay if they are likelier right than those of lists alone, or near them. There is no confidence.
 ///
 /// # Errors
 /// When the lists do not have one row per slot, or the arguments are of different queries.
@@ -213,8 +199,7 @@ pub fn with_lists(
     recover_from(&known, &query.released, lists, &options)
 }
 
-/// Predicts whether a fit is right, and its error. A fit is right if more views agree than chance would give: wrong lines pass near the
-/// point, too, and the best of many hypotheses is chosen. Constants are rounded from a fit on RedKitchen (docs/decisions/sequence.md).
+/// Predicts whether a fit is right, and its error: more views agree than by chance (docs/decisions/sequence.md).
 fn confidence(
     fit: &Fit,
     n_views: usize,
@@ -238,8 +223,7 @@ fn confidence(
     Confidence { found: found as f32, scale: (0.33 * noise_px * fit.condition) as f32 }
 }
 
-/// A mutual nearest neighbor is a link if its distance is below this share of the distance of the second nearest. Geometry rejects wrong
-/// links later, so that a strict ratio would only lose right ones (docs/decisions/sequence.md).
+/// A mutual nearest neighbor is a link if its distance is below this share of that of the second nearest (docs/decisions/sequence.md).
 const RATIO: f32 = 0.95;
 
 /// Links between the slots of all queries of a sequence.
@@ -250,8 +234,7 @@ pub struct Links {
 }
 
 impl Links {
-    /// Links mutual nearest neighbors of the descriptors of any two queries that are fewer than `reach` apart and look in similar
-    /// directions.
+    /// Links mutual nearest neighbors of the descriptors of queries fewer than `reach` apart that look in similar directions.
     ///
     /// # Errors
     /// When a query has no descriptors, or two have descriptors of different length.
@@ -269,9 +252,10 @@ impl Links {
         }
         let described = comparable(&described);
         let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();
+        let toward = |query: usize| &queries[query].camera.pose.rotation[2];
         let pairs: Vec<(usize, usize)> = (0..queries.len())
             .flat_map(|a| (a + 1..queries.len().min(a + reach)).map(move |b| (a, b)))
-            .filter(|&(a, b)| queries[a].looks_like(&queries[b]))
+            .filter(|&(a, b)| dot(toward(a), toward(b)) > TURNED)
             .collect();
         let of_pair = |&(a, b): &(usize, usize)| mutual(&blocks[a], &blocks[b]);
         let found: Vec<_> = pairs.par_iter().with_max_len(1).map(of_pair).collect();
@@ -296,8 +280,7 @@ impl Links {
         links
     }
 
-    /// Returns these links for other releases of the same keypoints. `of_slots` has, per query, the slot of each new slot in the
-    /// release of these links.
+    /// Returns these links for other releases of the same keypoints. `of_slots` has, per query, the old slot of each new slot.
     ///
     /// # Panics
     /// When a slot is out of range or a slot has no new one.

@@ -1,7 +1,6 @@
 //! Triangulation of a point from the records of several views, one record per view.
 //!
-//! A line of an image back-projects to a plane through the camera center. Three planes meet in a point, and further ones check it. A
-//! record of axis candidates is one of two lines, so that every subset of three views has eight solutions and a fourth view decides.
+//! Lines of images back-project to planes, of which three meet in a point. Axis candidates are two lines, so that a fourth view decides.
 
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{cross, distance, dot};
@@ -18,7 +17,6 @@ pub struct Sight {
     area: Bounds<2>,
     /// Back-projected lines, of which one contains the keypoint; the second is unused for most records.
     planes: [Plane; 2],
-    /// Unit normals of these lines in the image.
     normals: [[f64; 2]; 2],
     n_planes: usize,
 }
@@ -71,8 +69,7 @@ pub struct Fit {
     pub n_agree: usize,
     /// Root mean square distance of its projections from the lines of these views, in pixels.
     pub residual_px: f64,
-    /// Condition: standard deviation of `place` along its line, in pixels, if all lines are off by one pixel. Large where planes are
-    /// nearly parallel, infinite where they do not fix a point.
+    /// Standard deviation of `place` along its line, in pixels, if all lines are off by one pixel; infinite where planes fix no point.
     pub condition: f64,
     /// Lead over the best solution at another place, as a difference of squared residuals in units of the noise. Infinite without one.
     pub lead: f64,
@@ -80,18 +77,15 @@ pub struct Fit {
 
 /// Most hypotheses of three records.
 pub(super) const MOST_HYPOTHESES: usize = 240;
-/// Hypotheses that are refined.
 const REFINED: usize = 5;
-/// Steps of refinement.
 const STEPS: usize = 8;
 /// Distance that counts as a miss, in units of the noise.
 pub(super) const MISS: f64 = 3.0;
 /// Two solutions are at different places if they are farther apart in the first view than this, in units of the noise.
 const APART: f64 = 5.0;
 
-/// Finds the point that most of `sights` agree on; the first must be among them. `noise_px` is the usual distance of a keypoint from the
-/// projection of its point. Returns `None` if there are fewer than three records, or if no point is in front of the cameras and inside of
-/// the images.
+/// Finds the point that most of `sights` agree on, the first among them; `noise_px` is their usual error. Returns `None` with fewer than
+/// three records, or if no point is in front of the cameras and inside of the images.
 pub fn triangulate(sights: &[Sight], noise_px: f64) -> Option<Fit> {
     let (first, others) = sights.split_first()?;
     // Pairs of other views in the order of their sum, so that early ones are used evenly.
@@ -154,7 +148,6 @@ fn cost(sights: &[Sight], x: &[f64; 3], noise_px: f64) -> f64 {
     sights.iter().map(of).sum()
 }
 
-/// Returns the point where three planes meet, unless two are nearly parallel.
 fn meet(a: &Plane, b: &Plane, c: &Plane) -> Option<[f64; 3]> {
     let normal = |p: &Plane| [p[0], p[1], p[2]];
     solve([normal(a), normal(b), normal(c)], [-a[3], -b[3], -c[3]])

@@ -35,7 +35,6 @@ const CLEARLY: f64 = 1.2;
 const SURE: f64 = 0.95;
 /// Two discs of radius 1 at distance `d` share about `1 - d / 1.6` of their area, up to 1.5.
 const LENGTH: f32 = 1.6;
-/// Least length of an edge in radii.
 const LEAST_LENGTH: f32 = 0.1;
 /// Number of fits of the affine map, each weighted by the ranges of the one before.
 const FITS: usize = 8;
@@ -105,7 +104,6 @@ fn agreement<const D: usize>(lists: &Neighborhoods, estimates: &[Estimate<D>]) -
 /// Edges between likely neighbors, in both directions, with their lengths in radii.
 struct Edges {
     of: Vec<Vec<(u32, f32)>>,
-    /// Fraction of listed records that are edges.
     kept: f64,
 }
 
@@ -185,20 +183,18 @@ fn landmark_scaling<const D: usize>(edges: &Edges, number: usize) -> Option<Vec<
     let n = edges.of.len();
     let every = n.div_ceil(LANDMARKS).max(1);
     let landmarks: Vec<usize> = (number % every..n).step_by(every).collect();
-    let paths: Vec<(usize, Vec<f32>)> =
-        landmarks.into_par_iter().map(|slot| (slot, edges.shortest_paths(slot))).collect();
+    let paths = landmarks.into_par_iter().map(|slot| (slot, edges.shortest_paths(slot)));
     let sees_most = |(_, lengths): &(usize, Vec<f32>)| {
         2 * lengths.iter().filter(|length| length.is_finite()).count() > n
     };
-    let paths: Vec<(usize, Vec<f32>)> = paths.into_iter().filter(sees_most).collect();
+    let paths: Vec<(usize, Vec<f32>)> = paths.filter(sees_most).collect();
     let m = paths.len();
     if m <= D {
         return None;
     }
     let squared = |a: usize, slot: usize| f64::from(paths[a].1[slot]).powi(2);
-    let mean: Vec<f64> = (0..m)
-        .map(|a| paths.iter().map(|path| squared(a, path.0)).sum::<f64>() / m as f64)
-        .collect();
+    let mean = |a: usize| paths.iter().map(|path| squared(a, path.0)).sum::<f64>() / m as f64;
+    let mean: Vec<f64> = (0..m).map(mean).collect();
     let all = mean.iter().sum::<f64>() / m as f64;
     let gram = DMatrix::from_fn(m, m, |a, b| {
         let path = (squared(a, paths[b].0) + squared(b, paths[a].0)) / 2.0;
@@ -229,15 +225,16 @@ fn affine<const D: usize>(
 ) -> Option<Vec<f64>> {
     let n = D + 1;
     let mut ranges = vec![1.0; slots.len()];
-    let homogeneous = |slot: u32| -> Option<Vec<f64>> {
-        layout[slot as usize].map(|place| place.into_iter().chain([1.0]).collect())
+    // Rows and homogeneous coordinates.
+    let placed = |&slot: &u32| -> Option<(&LineRow<D>, Vec<f64>)> {
+        let place = layout[slot as usize]?.into_iter().chain([1.0]).collect();
+        Some((&rows[slot as usize], place))
     };
+    let placed: Vec<_> = slots.iter().map(placed).collect::<Option<_>>()?;
     for fit in 0..FITS {
         let mut normal = DMatrix::zeros(D * n, D * n);
         let mut right = DVector::zeros(D * n);
-        for (&slot, range) in slots.iter().zip(&ranges) {
-            let row = &rows[slot as usize];
-            let place = homogeneous(slot)?;
+        for ((row, place), range) in placed.iter().zip(&ranges) {
             let weight = if fit == 0 { 1.0 } else { 1.0 / (range * range) };
             // The components across the ray of `M place - anchor`.
             let across = |a: usize, b: usize| {
@@ -258,9 +255,7 @@ fn affine<const D: usize>(
         if !map.iter().all(|x| x.is_finite()) {
             return None;
         }
-        for (&slot, range) in slots.iter().zip(&mut ranges) {
-            let row = &rows[slot as usize];
-            let place = homogeneous(slot)?;
+        for ((row, place), range) in placed.iter().zip(&mut ranges) {
             let along = |c: usize| {
                 let x: f64 = (0..n).map(|i| map[c * n + i] * place[i]).sum();
                 (x - f64::from(row.through[c])) * f64::from(row.direction[c])
@@ -272,7 +267,6 @@ fn affine<const D: usize>(
     Some(ranges)
 }
 
-/// Gradient ascent of the ranges of `slots`.
 struct Ascent<'a, const D: usize> {
     rows: &'a [LineRow<D>],
     lists: &'a Neighborhoods,

@@ -1,10 +1,8 @@
 //! The start: ranges from the spread of bearings.
 //!
-//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions, so crossings give no position.
-//! Perspective gives a range: from the anchor, neighbors within a distance `s` of a point at range `r` are seen within an
-//! angle of `s / r`. The angle is that of the window of bearings whose listed rays are least probable by chance. The
-//! distance `s` is unknown, but among rays of similar bearing those with narrow windows are likely long. Points are assumed to
-//! be uniform over the region, so that the rank of a window gives a range.
+//! Rays of one anchor meet only there, and rays of two anchors not at all, so crossings give no position. Perspective gives a range:
+//! neighbors within a distance `s` of a point at range `r` are seen within an angle of `s / r`, that of the least probable window of
+//! bearings. `s` is unknown, but among rays of similar bearing those with narrow windows are likely long: ranks give ranges.
 
 use rayon::prelude::*;
 
@@ -24,7 +22,6 @@ const LEAST_SECTOR: usize = 20;
 /// A window of bearings around a slot's ray.
 #[derive(Clone, Copy, Debug)]
 struct Window {
-    /// Sine of the half angle.
     sine: f32,
     count: u32,
     evidence: f32,
@@ -34,7 +31,9 @@ pub(in crate::recover) fn solve<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
 ) -> Vec<Estimate<D>> {
-    let bearings = bearings(rows);
+    let bearing = |(slot, row): (usize, &LineRow<D>)| (row.group, angle(row), slot as u32);
+    let mut bearings: Vec<_> = rows.iter().enumerate().map(bearing).collect();
+    bearings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let n = lists.n_slots();
     let windows: Vec<Option<Window>> =
         (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
@@ -149,13 +148,6 @@ fn sine<const D: usize>(a: &LineRow<D>, b: &LineRow<D>) -> f32 {
 
 /// All bearings as (group, angle, slot), sorted.
 type Bearings = [(u32, f64, u32)];
-
-fn bearings<const D: usize>(rows: &[LineRow<D>]) -> Vec<(u32, f64, u32)> {
-    let bearing = |(slot, row): (usize, &LineRow<D>)| (row.group, angle(row), slot as u32);
-    let mut bearings: Vec<_> = rows.iter().enumerate().map(bearing).collect();
-    bearings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    bearings
-}
 
 /// Returns the fraction of all records that are rays of the anchor of `own` within `sine` of it.
 fn fraction_within<const D: usize>(bearings: &Bearings, own: &LineRow<D>, sine: f32) -> f32 {

@@ -1,17 +1,16 @@
 //! The published density attacks, for comparison. They read only the records and use the published constants.
 //!
-//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote at their closest approach, the peak of the votes is
-//! the estimate, and lines near the estimates vote again. Two points per line (Lee et al., CVPR 2023): the two highest peaks
-//! of a kernel density of the votes. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
+//! One point per line (Chelani et al., CVPR 2021): lines vote at their closest approach, and those near the peaks vote again. Two points
+//! per line (Lee et al., CVPR 2023): the two highest peaks. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
 //!
-//! The published programs measure votes from the true point and take ranges from true distances. Here votes are measured from
-//! the foot of the line, a line does not vote for itself, and ranges come from the votes.
+//! The published programs use true points and distances. Here votes are measured from the foot, and ranges come from the votes.
 
 use rayon::prelude::*;
 
 use crate::density::Peaks;
 use crate::density::feasible::{Feasible, Hides};
 use crate::density::peaks::maxima;
+use crate::geometry::vector::median;
 use crate::recover::map::{LineRow, NO_GROUP, NO_VOTE};
 use crate::recover::result::Estimate;
 use crate::released::Released;
@@ -28,34 +27,28 @@ const FEWEST: usize = 10;
 const MAX_VOTERS: usize = 100_000;
 
 /// Returns the points that the published attacks find. They support neither planes, nor axis candidates, nor 2D maps.
-pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
-    let n_slots = released.n_slots();
-    let Some(feasible) = Feasible::new(released) else {
-        return Peaks::none(n_slots);
-    };
-    if feasible.hides == Hides::OnAxis || n_slots == 0 {
-        return Peaks::none(n_slots);
-    }
+pub(crate) fn published<const D: usize>(released: &Released<D>) -> Option<Peaks> {
+    let feasible = Feasible::new(released).filter(|feasible| feasible.hides != Hides::OnAxis)?;
     let lines: &[LineRow<3>] = &feasible.lines;
     let every = lines.len().div_ceil(MAX_VOTERS);
+    let is_paired = feasible.hides == Hides::Two;
     // A vote for paired lines may mean either point.
-    let limit = if feasible.hides == Hides::Two { 1000 } else { 500 };
+    let limit = if is_paired { 1000 } else { 500 };
     let k = limit.min((COARSE * lines.len() as f64) as usize).max(2);
     let place = |row: usize| {
         let misses = lines.iter().step_by(every).map(|line| section(&lines[row], line).1);
         let (near, reach) = nearest(misses.collect(), k, (lines, row), every);
         let mut votes = passes(&lines[row], near.iter().map(|&at| &lines[at]));
-        let modes = match feasible.hides {
-            Hides::Two => two_modes(&mut votes).map(|pair| pair.map(Some)),
-            _ => mode(&mut votes).map(|t| [Some(t), None]),
-        };
-        let peaks = modes.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
-        (peaks, reach)
+        let one = |votes: &mut [f64]| mode(votes).map(|t| [t; 2]);
+        let modes = if is_paired { two_modes(&mut votes) } else { one(&mut votes) };
+        (modes.map_or([None; 2], |modes| modes.map(|t| on(&lines[row], t))), reach)
     };
     let rows: Vec<([Option<Estimate<3>>; 2], f32)> =
         (0..lines.len()).into_par_iter().map(place).collect();
-    let resolution = median(rows.iter().map(|row| row.1));
-    let per_record = if feasible.hides == Hides::Two { 2 } else { 1 };
+    let reaches = rows.iter().map(|row| f64::from(row.1));
+    let mut reaches: Vec<f64> = reaches.filter(|reach| reach.is_finite()).collect();
+    let resolution = if reaches.is_empty() { 0.0 } else { median(&mut reaches) };
+    let per_record = released.slots_per_record();
     let peaks = rows.into_iter().flat_map(|row| row.0.into_iter().take(per_record));
     let mut of: Vec<Option<Estimate<3>>> = peaks.collect();
     if feasible.hides == Hides::One {
@@ -63,7 +56,7 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
             of = refine(lines, &of, every);
         }
     }
-    Peaks { of, resolution }
+    Some(Peaks { of, resolution })
 }
 
 /// Refines once: lines vote that pass near the estimate of a line and whose own estimates are near that line. Every `every`-th line votes.
@@ -104,8 +97,7 @@ fn section(line: &LineRow<3>, passing: &LineRow<3>) -> (f32, f32, f32) {
     LineRow { group: NO_GROUP, ..*line }.section(passing)
 }
 
-/// Returns the `k` lines that vote with the smallest finite distances (ties by index), unordered, and the largest of these distances, not
-/// squared. `squared` has the distance of every `every`-th line. The line of `row` itself does not vote, nor do rays of its center.
+/// Returns the `k` voting lines with the smallest finite distances, and the largest of these. `squared` has that of every `every`-th line.
 fn nearest(
     squared: Vec<f32>,
     k: usize,
@@ -114,11 +106,11 @@ fn nearest(
 ) -> (Vec<usize>, f32) {
     let own = &lines[row];
     let votes = |at: usize| if own.is_ray() { lines[at].group != own.group } else { at != row };
-    // Distances are not negative, so their bits sort as they do.
-    let key = |(at, d): (usize, f32)| u64::from(d.to_bits()) << 32 | at as u64;
     let voting = squared.into_iter().enumerate().map(|(number, d)| (number * every, d));
+    let voting = voting.filter(|&(at, d)| d.is_finite() && votes(at));
+    // Distances are not negative, so their bits sort as they do.
     let mut keys: Vec<u64> =
-        voting.filter(|&(at, d)| d.is_finite() && votes(at)).map(key).collect();
+        voting.map(|(at, d)| u64::from(d.to_bits()) << 32 | at as u64).collect();
     if keys.len() > k {
         keys.select_nth_unstable(k - 1);
         keys.truncate(k);
@@ -134,11 +126,6 @@ fn on(line: &LineRow<3>, t: f64) -> Option<Estimate<3>> {
     finite.then(|| Estimate::at(position, 0, 0, 0.0))
 }
 
-fn median(values: impl Iterator<Item = f32>) -> f64 {
-    let mut values: Vec<f64> = values.map(f64::from).filter(|x| x.is_finite()).collect();
-    if values.is_empty() { 0.0 } else { crate::geometry::vector::median(&mut values) }
-}
-
 // Peaks of the votes along a line: rules and constants of the published programs.
 
 /// Votes dropped at either end.
@@ -147,12 +134,10 @@ const CUT: usize = 5;
 const BINS: usize = 500;
 /// The peak begins within this fraction of the range.
 const BEGINS_WITHIN: f64 = 0.9;
-/// Narrowing continues while the votes differ from uniform ones by more than this (Kuiper's statistic) and more than
-/// [`CUT`] are left.
+/// Narrowing continues while votes differ from uniform ones by more than this (Kuiper's statistic) and more than [`CUT`] are left.
 const EVEN: f64 = 0.3;
 
-/// Returns the middle of the peak of `votes` (which are reordered), by Chelani et al.: repeatedly, the interval over which the
-/// cumulative votes rise most above uniform ones. `None` without votes.
+/// Returns the middle of the peak of `votes` (reordered): repeatedly, the interval where they rise most above uniform ones.
 fn mode(votes: &mut [f64]) -> Option<f64> {
     votes.sort_unstable_by(f64::total_cmp);
     let all: &[f64] = votes;
@@ -200,12 +185,10 @@ fn first_extreme(values: &[f64], beats: impl Fn(f64, f64) -> bool) -> usize {
 const BANDWIDTH: f64 = 0.07;
 /// Places at which the density is evaluated. The published number is 10,000; the kernel spans many of these.
 const PLACES: usize = 1024;
-/// Fraction of the votes dropped at either end, because nearly parallel lines vote anywhere. (The published range comes
-/// from distances between true points.)
+/// Fraction of the votes dropped at either end, because nearly parallel lines vote anywhere.
 const TRIMMED: f64 = 0.01;
 
-/// Returns the two highest peaks of the density of `votes` (which are reordered), ascending, by Lee et al.; one peak is
-/// returned twice. `None` without votes.
+/// Returns the two highest peaks of the density of `votes` (which are reordered), ascending, by Lee et al.; `None` without votes.
 fn two_modes(votes: &mut [f64]) -> Option<[f64; 2]> {
     votes.sort_unstable_by(f64::total_cmp);
     let cut = (TRIMMED * votes.len() as f64).ceil() as usize;

@@ -1,9 +1,7 @@
 //! The sampling loop of the paper (section 4), for comparison.
 //!
-//! Each trial draws a few listed records and computes their least-squares position, Eq. (4). The position with the largest support
-//! is refined by least squares over the supporting records. The number of trials follows the largest support so far (draws
-//! without replacement, 99 % confidence) and is at most 10,000. The paper does not give the sample size: here it is two records per
-//! unknown coordinate (for planes, one may be drawn twice).
+//! Each trial draws two listed records per unknown coordinate and computes their least-squares position, Eq. (4). The number of trials
+//! follows the largest support so far (draws without replacement, 99 % confidence).
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -95,8 +93,7 @@ impl<const D: usize, F: Family<D> + Trials<D>> Step for Sampling<'_, D, F> {
     }
 }
 
-/// Draws samples of `size` of `n` records until one without outliers was likely drawn. Returns that with the largest support and its support,
-/// if any has support, and the number of trials.
+/// Draws samples until one without outliers was likely drawn; returns the one with most support, if any, and the number of trials.
 #[inline(always)]
 fn best_sample<T>(
     (n, size): (u32, u32),
@@ -117,8 +114,7 @@ fn best_sample<T>(
     (best, trials)
 }
 
-/// Returns the number of trials after which a sample of `size` inliers, of `inliers` among `n`, was drawn with probability
-/// [`CONFIDENCE`].
+/// Returns the number of trials that draw a sample of `size` inliers, of `inliers` among `n`, with probability [`CONFIDENCE`].
 #[inline(always)]
 fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     let mut all_inliers = 1.0;
@@ -132,8 +128,7 @@ fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     (trials.ceil() as u32).clamp(1, MAX_TRIALS)
 }
 
-/// Returns the parameter along the line of the gathered sections, refined by least squares. `may_vote` is the number of listed records that
-/// may vote.
+/// Returns the parameter along the line of the gathered sections, refined by least squares. `may_vote` listed records may vote.
 #[inline(always)]
 fn on_line<const D: usize>(
     Task { delta, mut draws, .. }: Task<'_>,
@@ -255,12 +250,10 @@ impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
 
 /// Returns the exchanged axis of every record, by majority vote over all neighborhoods that contain it.
 ///
-/// In a neighborhood (a slot's record and its listed records), each member votes for the axis with the largest sum of distances
-/// to the others. The paper does not define "relatively larger". Here sums are divided by their mean over the neighborhood;
-/// otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
+/// In a neighborhood (a slot's record and its list), each member votes for the axis with the largest sum of distances to the others. Sums
+/// are divided by their mean: otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
 fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
-    let votes: Vec<[AtomicU32; D]> =
-        rows.iter().map(|_| std::array::from_fn(|_| AtomicU32::new(0))).collect();
+    let votes: Vec<AtomicU32> = (0..D * rows.len()).map(|_| AtomicU32::new(0)).collect();
     (0..lists.n_slots()).into_par_iter().for_each(|slot| {
         let mut members = vec![RecordId::from_index(slot)];
         members.extend_from_slice(lists.of(slot));
@@ -275,14 +268,11 @@ fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
         });
         for (at, member) in members.iter().enumerate() {
             let guess = largest::<D>(|axis| distances[axis][at]);
-            votes[member.index()][usize::from(guess)].fetch_add(1, Ordering::Relaxed);
+            votes[D * member.index() + usize::from(guess)].fetch_add(1, Ordering::Relaxed);
         }
     });
-    let of = |votes: [AtomicU32; D]| {
-        let votes = votes.map(|n| n.into_inner() as f32);
-        largest::<D>(|axis| votes[axis])
-    };
-    votes.into_iter().map(of).collect()
+    let of = |of: &[AtomicU32]| largest::<D>(|axis| of[axis].load(Ordering::Relaxed) as f32);
+    votes.chunks_exact(D).map(of).collect()
 }
 
 /// Returns the axis with the largest value, the lowest of equal ones.

@@ -1,8 +1,6 @@
 //! Beliefs: a few places per slot, each with the probability that it is the right one.
 //!
-//! Lists that a source makes from descriptors are unlike those of the oracle. Few entries are right, entries with better scores are right
-//! more often, and entries are wrong together, because records with similar descriptors list the same records. So the lists of a slot often
-//! support several places. This step starts from the estimates of joint recovery. In an iteration it
+//! Records with similar descriptors list the same records, so that lists of a source often support several places. In an iteration it
 //!
 //! 1. learns, for each class `c` of edges, the likelihood ratio `L_c(u)` of an edge between points at distance `u` against one between
 //!    points that are far apart (`tables`). The unit of `u` is a *width*, about the distance to the 50th nearest estimate
@@ -13,12 +11,10 @@
 //!    in images without the density;
 //! 4. refines the best place, and keeps the best ones with weights proportional to `exp(score)`.
 //!
-//! The density counts the places of other slots within a width: points lie on surfaces. Places of the own slot do not count, because they
-//! would confirm themselves. The volume element is `range^2` for rays, which diverge; for axis candidates, it is the density of the values
-//! published on the axis that was exchanged. The first iteration moves all slots, the others one of two random halves in turn.
+//! The volume element is `range^2` for rays; for axis candidates, it is the density of the values published on the axis that was exchanged.
+//! The first iteration moves all slots, the others one of two random halves in turn.
 //!
-//! The method is belief propagation with particles on the graph of lists, as in the localization of sensor networks (Ihler et al. 2005),
-//! without the division by messages sent before, which changed no figure. Figures are in docs/decisions/tried.md.
+//! It is belief propagation with particles on the graph of lists (Ihler et al. 2005). Figures are in docs/decisions/tried.md.
 
 mod tables;
 mod temper;
@@ -38,7 +34,6 @@ use crate::seed::{Draws, Stage};
 use tables::{BIN_ENDS, Tables};
 
 const ITERATIONS: usize = 5;
-/// Largest number of places per slot.
 const PLACES: usize = 4;
 /// A width is the distance to this neighbor, counted among all slots: in images, and in maps.
 const WIDTH_NEIGHBOR: [usize; 2] = [20, 50];
@@ -58,8 +53,7 @@ const CANDIDATES: usize = 40;
 const OF_EDGES: f32 = 0.67;
 /// An edge proposes a candidate if the squared distance of its place to the record is below this, in squared widths.
 const NEAR2: f32 = 2.0;
-/// Number of random places that are tried for candidates that no edge proposes, and their largest squared distance to the record, in images
-/// and in maps.
+/// Number of random places that are tried without an edge, and their largest squared distance to the record, in images and in maps.
 const PROPOSALS: usize = 300;
 const PROPOSAL_NEAR2: [f32; 2] = [0.3, 1.0];
 /// Candidates are at least this far apart, in widths; kept places are farther apart than [`MERGED`] typical widths.
@@ -75,8 +69,7 @@ const AGREED: f32 = 0.3;
 /// Places with less weight are dropped.
 const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Returns the estimates of all slots after beliefs from `start`, those of joint recovery. Without enough slots, they stay. Records have one
-/// slot each.
+/// Returns the estimates of all slots, one per record, after beliefs from `start`. Without enough slots, they stay.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
@@ -86,12 +79,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         return estimates;
     }
     let marginals = marginals(problem.family, start.len());
-    let belief = |(weight, estimate): (f32, &Estimate<D>)| match estimate.is_known() {
-        true => vec![Place { x: estimate.position, piece: estimate.axis, weight }],
-        false => Vec::new(),
-    };
-    let mut beliefs: Vec<Vec<Place<D>>> =
-        start_weights(&start).into_iter().zip(&start).map(belief).collect();
+    let mut beliefs = first_beliefs(&start);
     let (mut typical, mut tables) = (None, None);
     for iteration in 0..ITERATIONS {
         let Some(places) = Places::new(&beliefs, &estimates, &mut typical) else {
@@ -100,20 +88,21 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
         let learned = Tables::learn(problem, &places, tables.as_ref());
         let points: Vec<[f64; D]> = places.all.iter().map(|place| widen(&place.x)).collect();
         let Ok(tree) = Knn::new(&points) else { return estimates };
-        let context = Context {
+        let mut context = Context {
             problem,
-            temper: temper::learn(problem, &places, &learned),
+            temper: 1.0,
             proposals: proposals(&places, problem.seed),
             places: &places,
             tables: &learned,
             crowd: Crowd::new(&places, &tree),
             marginals: &marginals,
         };
-        let moves = |&slot: &usize| {
+        context.temper = context.learn_temper();
+        let mut slots = along_curve(&estimates);
+        slots.retain(|&slot| {
             let mut draws = Draws::new(problem.seed, Stage::Beliefs, slot as u64);
             iteration == 0 || draws.below(2) as usize == iteration % 2
-        };
-        let slots: Vec<usize> = along_curve(&estimates).into_iter().filter(moves).collect();
+        });
         let updated = solve_slots(&context, &slots);
         for (slot, belief) in slots.into_iter().zip(updated) {
             if let Some(belief) = belief {
@@ -153,15 +142,17 @@ fn short_edges<const D: usize, F: Family<D>>(
     short as f32 / all.max(1) as f32
 }
 
-/// Returns the weight of each estimate of joint recovery, by the rank of its evidence.
-fn start_weights<const D: usize>(estimates: &[Estimate<D>]) -> Vec<f32> {
+/// Returns the estimates of joint recovery as beliefs, weighted by the rank of their evidence.
+fn first_beliefs<const D: usize>(estimates: &[Estimate<D>]) -> Vec<Vec<Place<D>>> {
     let mut order: Vec<usize> = (0..estimates.len()).collect();
     order.sort_by(|&a, &b| estimates[a].evidence.total_cmp(&estimates[b].evidence));
-    let mut weights = vec![0.0; estimates.len()];
-    for (rank, slot) in order.into_iter().enumerate() {
-        weights[slot] = START_WEIGHT.0 + START_WEIGHT.1 * rank as f32 / estimates.len() as f32;
+    let mut beliefs = vec![Vec::new(); estimates.len()];
+    for (rank, slot) in order.into_iter().enumerate().filter(|&(_, s)| estimates[s].is_known()) {
+        let Estimate { position: x, axis: piece, .. } = estimates[slot];
+        let weight = START_WEIGHT.0 + START_WEIGHT.1 * rank as f32 / estimates.len() as f32;
+        beliefs[slot].push(Place { x, piece, weight });
     }
-    weights
+    beliefs
 }
 
 /// A possible place of a slot, on a piece of its feasible set, and the probability that it is the right one.
@@ -175,19 +166,15 @@ struct Place<const D: usize> {
 /// The places of all slots, the one with the best score of each slot first.
 struct Places<const D: usize> {
     all: Vec<Place<D>>,
-    /// Range of the places of each slot.
     offsets: Vec<u32>,
-    /// Slot of each place.
     slot: Vec<u32>,
-    /// Width at each place.
     width: Vec<f32>,
     /// The median width of the start, the unit of lengths that hold for the whole map.
     typical: f32,
 }
 
 impl<const D: usize> Places<D> {
-    /// Measures the width at every place; `estimates` are the best places. The first call sets the `typical` width. Returns `None` if no
-    /// slot has a place, or most places coincide.
+    /// Measures the width at every place; `estimates` are the best ones. The first call sets `typical`. `None` if most places coincide.
     fn new(
         beliefs: &[Vec<Place<D>>],
         estimates: &[Estimate<D>],
@@ -236,23 +223,19 @@ impl<const D: usize> Places<D> {
 
 /// Returns places that are likely right, in random order: what slots are near that no edge names.
 fn proposals<const D: usize>(places: &Places<D>, seed: u64) -> Vec<[f32; D]> {
-    let best: Vec<(usize, &Place<D>)> = (0..places.n_slots())
-        .filter_map(|slot| Some((slot, places.all[places.of(slot)].first()?)))
-        .collect();
+    let best = |slot: usize| Some((slot, places.all[places.of(slot)].first()?));
+    let mut best: Vec<(usize, &Place<D>)> = (0..places.n_slots()).filter_map(best).collect();
     let mut weights: Vec<f32> = best.iter().map(|(_, place)| place.weight).collect();
     let low = 3 * weights.len() / 10;
     let least = *weights.select_nth_unstable_by(low, f32::total_cmp).1;
-    let mut likely: Vec<(u64, [f32; D])> = best
-        .into_iter()
-        .filter(|(_, place)| place.weight >= least)
-        .map(|(slot, p)| (Draws::new(seed, Stage::BeliefProposals, slot as u64).bits(), p.x))
-        .collect();
-    likely.sort_unstable_by_key(|entry| entry.0);
-    likely.into_iter().map(|(_, x)| x).collect()
+    best.retain(|(_, place)| place.weight >= least);
+    best.sort_by_cached_key(|&(slot, _)| {
+        Draws::new(seed, Stage::BeliefProposals, slot as u64).bits()
+    });
+    best.into_iter().map(|(_, place)| place.x).collect()
 }
 
-/// The volume element of axis candidates: per piece and slot, the logarithm of the density of the values on the exchanged axis. Empty for
-/// families whose feasible sets have one piece.
+/// The volume element of axis candidates: per piece and slot, the logarithm of the density of values on the axis. Else empty.
 fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>> {
     if F::PIECES == 1 {
         return Vec::new();
@@ -273,8 +256,7 @@ fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>
     (0..F::PIECES).map(of_axis).collect()
 }
 
-/// All places in the order of the leaves of a search tree, in columns, so that the places of a leaf take a few vector instructions.
-/// Columns have a leaf more than there are places.
+/// All places in the order of the leaves of a search tree, in columns, padded by a leaf, so that loops run over vectors.
 struct Crowd<'a, const D: usize> {
     tree: &'a Knn<'a, D>,
     x: [Vec<f32>; D],
@@ -284,7 +266,7 @@ struct Crowd<'a, const D: usize> {
 
 impl<'a, const D: usize> Crowd<'a, D> {
     fn new(places: &Places<D>, tree: &'a Knn<'a, D>) -> Self {
-        let order = || tree.leaf_order().iter().map(|&at| at as usize);
+        let order = || tree.rows.iter().map(|&at| at as usize);
         let padded = |of: &dyn Fn(usize) -> f32| -> Vec<f32> {
             order().map(of).chain([0.0; LEAF]).collect()
         };
@@ -327,20 +309,17 @@ impl<'a, const D: usize> Crowd<'a, D> {
     }
 }
 
-/// Returns a leaf's part of a column of [`Crowd`].
 #[inline(always)]
 fn leaf<T>(column: &[T], start: usize) -> &[T; LEAF] {
     column[start..].first_chunk().expect("columns are padded")
 }
 
-/// What an iteration reads.
 struct Context<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
     places: &'a Places<D>,
     tables: &'a Tables,
     temper: f32,
     proposals: Vec<[f32; D]>,
-    /// All places, for their density.
     crowd: Crowd<'a, D>,
     marginals: &'a [Vec<f32>],
 }
@@ -371,41 +350,36 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
     /// Returns the new places of `slot`, the best one first; `None` if there is no candidate.
     #[inline(always)]
     fn solve(&self, slot: usize, scratch: &mut Scratch<D>) -> Option<Vec<Place<D>>> {
-        let Scratch { near, candidates, leaves } = scratch;
-        near.resize_with(F::PIECES, Vec::new);
-        candidates.clear();
-        for (piece, near) in near.iter_mut().enumerate() {
-            self.propose(slot, piece, near, candidates);
+        scratch.near.resize_with(F::PIECES, Vec::new);
+        scratch.candidates.clear();
+        for piece in 0..F::PIECES {
+            self.propose(slot, piece, scratch);
         }
         for place in &self.places.all[self.places.of(slot)] {
             let piece = usize::from(place.piece);
-            candidates.push(Candidate { x: place.x, piece, score: 0.0 });
+            scratch.candidates.push(Candidate { x: place.x, piece, score: 0.0 });
         }
         let mut best = 0;
-        for at in 0..candidates.len() {
-            let Candidate { x, piece, .. } = candidates[at];
-            candidates[at].score = self.score(slot, piece, &near[piece], &x, leaves);
-            if candidates[at].score > candidates[best].score {
+        for at in 0..scratch.candidates.len() {
+            let Candidate { x, piece, .. } = scratch.candidates[at];
+            let score = self.score(slot, piece, &x, scratch);
+            scratch.candidates[at].score = score;
+            if score > scratch.candidates[best].score {
                 best = at;
             }
         }
-        let refined = self.refine(slot, *candidates.get(best)?, near, leaves);
-        candidates.push(refined);
-        Some(self.kept(candidates, refined.score))
+        let refined = self.refine(slot, *scratch.candidates.get(best)?, scratch);
+        scratch.candidates.push(refined);
+        Some(self.kept(&mut scratch.candidates, refined.score))
     }
 }
 
 impl<const D: usize, F: Family<D>> Context<'_, D, F> {
-    /// Fills `near` with the places of neighbors that are near a piece, and adds candidates on it.
+    /// Collects the places of neighbors that are near a piece, and adds candidates on it.
     #[inline(always)]
-    fn propose(
-        &self,
-        slot: usize,
-        piece: usize,
-        near: &mut Vec<Near<D>>,
-        candidates: &mut Vec<Candidate<D>>,
-    ) {
+    fn propose(&self, slot: usize, piece: usize, scratch: &mut Scratch<D>) {
         let Self { problem: Problem { family, graph, seed, .. }, places, .. } = self;
+        let (near, candidates) = (&mut scratch.near[piece], &mut scratch.candidates);
         let own = family.piece(slot, piece);
         let first = candidates.len();
         let room = CANDIDATES / F::PIECES;
@@ -456,16 +430,9 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
 
     /// Returns the log-posterior of a place, up to a constant.
     #[inline(always)]
-    fn score(
-        &self,
-        slot: usize,
-        piece: usize,
-        near: &[Near<D>],
-        x: &[f32; D],
-        leaves: &mut Vec<Range<usize>>,
-    ) -> f32 {
+    fn score(&self, slot: usize, piece: usize, x: &[f32; D], scratch: &mut Scratch<D>) -> f32 {
         let (mut sum, mut product, mut ratio) = (0.0, 1.0f32, 1.0f32);
-        for y in near {
+        for y in &scratch.near[piece] {
             let u = distance2(x, &y.x).sqrt() * y.inverse_width;
             ratio += y.weight * self.tables.at(y.class, u);
             if !y.goes_on {
@@ -479,15 +446,14 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         }
         let evidence = self.temper * (sum + ln(product));
         let own = self.problem.family.piece(slot, piece);
-        let range2 = match own.from_center {
-            true => distance2(&own.through, x) / (self.places.typical * self.places.typical),
-            false => 1.0,
-        };
+        let typical2 = self.places.typical * self.places.typical;
+        let range2 = if own.from_center { distance2(&own.through, x) / typical2 } else { 1.0 };
         // Keypoints lie all over an image: their density says nothing.
         let density = if D == 2 {
             0.0
         } else {
             let radius = DENSITY_RADIUS * self.places.typical;
+            let leaves = &mut scratch.leaves;
             let density = self.crowd.density(slot as u32, x, radius * radius, leaves);
             DENSITY_WEIGHT * ln(LEAST_DENSITY + density)
         };
@@ -499,13 +465,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
 
     /// Moves a candidate along its piece while that improves its score, in steps that become shorter.
     #[inline(always)]
-    fn refine(
-        &self,
-        slot: usize,
-        start: Candidate<D>,
-        near: &[Vec<Near<D>>],
-        leaves: &mut Vec<Range<usize>>,
-    ) -> Candidate<D> {
+    fn refine(&self, slot: usize, start: Candidate<D>, scratch: &mut Scratch<D>) -> Candidate<D> {
         let (mut best, piece) = (start, start.piece);
         let own = self.problem.family.piece(slot, piece);
         // Directions of a plane are the axes other than its normal.
@@ -523,7 +483,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 for step in [step, -step] {
                     let moved = std::array::from_fn(|c| best.x[c] + step * direction[c]);
                     let x = own.project(&moved);
-                    let score = self.score(slot, piece, &near[piece], &x, leaves);
+                    let score = self.score(slot, piece, &x, scratch);
                     if score > best.score {
                         best = Candidate { x, piece, score };
                         continue 'steps;
@@ -547,9 +507,10 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             if weight < LEAST_WEIGHT && !kept.is_empty() {
                 break;
             }
-            let is_near = |place: &Place<D>| distance2(&place.x, &candidate.x) < merged * merged;
-            if let Some(near) = kept.iter().position(is_near) {
-                kept[near].weight += weight;
+            let is_near =
+                |place: &&mut Place<D>| distance2(&place.x, &candidate.x) < merged * merged;
+            if let Some(near) = kept.iter_mut().find(is_near) {
+                near.weight += weight;
             } else if kept.len() < PLACES {
                 kept.push(Place { x: candidate.x, piece: candidate.piece as u8, weight });
             }

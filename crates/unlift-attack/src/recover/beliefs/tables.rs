@@ -20,7 +20,6 @@ const PASSES: (usize, usize) = (6, 3);
 /// Number of random pairs that every class is given: a class with few edges says little.
 const PRIOR: f64 = 10.0;
 
-/// Likelihood ratios of edges by class and distance.
 pub(super) struct Tables {
     /// Per class, the distribution of the distance over bins.
     bins: Vec<[f64; BINS]>,
@@ -29,19 +28,16 @@ pub(super) struct Tables {
 }
 
 fn bin_of(u: f32) -> usize {
-    if u < BIN_ENDS.0 {
-        return 0;
-    }
-    if u >= BIN_ENDS.1 {
-        return BINS - 1;
-    }
     let per_bin = ln(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
-    (1 + (ln(u / BIN_ENDS.0) / per_bin) as usize).min(BINS - 2)
+    match u {
+        _ if u < BIN_ENDS.0 => 0,
+        _ if u >= BIN_ENDS.1 => BINS - 1,
+        _ => (1 + (ln(u / BIN_ENDS.0) / per_bin) as usize).min(BINS - 2),
+    }
 }
 
 impl Tables {
-    /// Learns tables by expectation maximization. An edge says something about the distance if the places of both ends are right, which
-    /// has the probability of their weights; else its distance is unknown.
+    /// Learns tables by expectation maximization: an edge says something about the distance if the places of both ends are right.
     pub(super) fn learn<const D: usize, F: Family<D>>(
         problem: &Problem<'_, D, F>,
         places: &Places<D>,
@@ -61,11 +57,10 @@ impl Tables {
             for &slot in slots {
                 let mut draws = Draws::new(problem.seed, Stage::BeliefTables, slot as u64);
                 let random = (0..RANDOM).map(|_| draws.below(places.n_slots() as u64) as usize);
-                for (bin, weight) in
-                    random.filter(|&end| end != slot).flat_map(|end| pairs(slot, end))
-                {
+                let others = random.filter(|&end| end != slot);
+                others.flat_map(|end| pairs(slot, end)).for_each(|(bin, weight)| {
                     bins[usize::from(bin)] += f64::from(weight);
-                }
+                });
             }
             bins
         };
@@ -82,20 +77,18 @@ impl Tables {
             edges.filter(|edge| !edge.pairs.is_empty()).collect()
         };
         let edges: Vec<Vec<Edge>> = sample.par_chunks(CHUNK).map(edges).collect();
-        let first = || {
-            let near = std::array::from_fn(|bin| {
-                chance[bin] * (8.0 - 7.0 * bin as f64 / (BINS - 1) as f64)
-            });
-            vec![normalized(near); CLASSES]
+        let near = |bin: usize| chance[bin] * (8.0 - 7.0 * bin as f64 / (BINS - 1) as f64);
+        let (mut bins, passes) = match before {
+            None => (vec![normalized(std::array::from_fn(near)); CLASSES], PASSES.0),
+            Some(tables) => (tables.bins.clone(), PASSES.1),
         };
-        let mut bins = before.map_or_else(first, |tables| tables.bins.clone());
-        for _ in 0..if before.is_none() { PASSES.0 } else { PASSES.1 } {
+        for _ in 0..passes {
             let ratios: Vec<[f64; BINS]> =
                 bins.iter().map(|f| std::array::from_fn(|bin| f[bin] / chance[bin])).collect();
             let expected = |edges: &Vec<Edge>| {
                 let mut sums = vec![[0.0; BINS]; CLASSES];
-                for Edge { class, pairs } in edges {
-                    let class = usize::from(*class);
+                for &Edge { class, ref pairs } in edges {
+                    let class = usize::from(class);
                     let known: f64 = pairs.iter().map(|pair| f64::from(pair.1)).sum();
                     let unknown = (1.0 - known).max(0.0);
                     let likelihood = |&(bin, weight): &(u8, f32)| {
@@ -112,19 +105,16 @@ impl Tables {
                 sums
             };
             let parts: Vec<Vec<[f64; BINS]>> = edges.par_iter().map(expected).collect();
-            bins = (0..CLASSES)
-                .map(|class| {
-                    let mut sum = chance.map(|share| PRIOR * share);
-                    parts.iter().for_each(|part| add(&mut sum, &part[class]));
-                    normalized(sum)
-                })
-                .collect();
+            for (class, bins) in bins.iter_mut().enumerate() {
+                let mut sum = chance.map(|share| PRIOR * share);
+                parts.iter().for_each(|part| add(&mut sum, &part[class]));
+                *bins = normalized(sum);
+            }
         }
         let ratios = bins.iter().map(|f| interpolated(f, &chance)).collect();
         Self { bins, ratios }
     }
 
-    /// Returns `L_c(u) - 1`.
     #[inline(always)]
     pub(super) fn at(&self, class: u8, u: f32) -> f32 {
         let at = (u * PER_WIDTH).min((ENTRIES - 1) as f32);
@@ -156,9 +146,10 @@ fn interpolated(bins: &[f64; BINS], chance: &[f64; BINS]) -> [f32; ENTRIES] {
         std::array::from_fn(|bin| libm::log(bins[bin].max(1e-12) / chance[bin]) as f32);
     let step = libm::logf(BIN_ENDS.1 / BIN_ENDS.0) / (BINS - 2) as f32;
     let start = libm::logf(BIN_ENDS.0);
+    const LAST: usize = BINS - 1;
     let middle = |bin: usize| match bin {
         0 => start - 0.36,
-        _ if bin == BINS - 1 => libm::logf(BIN_ENDS.1),
+        LAST => libm::logf(BIN_ENDS.1),
         _ => start + (bin as f32 - 0.5) * step,
     };
     let logs: [f32; ENTRIES] = std::array::from_fn(|entry| {

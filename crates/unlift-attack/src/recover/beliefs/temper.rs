@@ -1,24 +1,19 @@
 //! The temper, learned from each slot's own record.
 //!
-//! The lists of a slot say where its point is, in space. Its record says so independently: a wrong place is near the record by chance
-//! only. So the temper is the exponent under which the lists, without the record, predict best where the record passes. Entries that
-//! are wrong together make it small; for the independent errors of the oracle it is larger.
+//! The lists of a slot say where its point is, and its record says so independently. So the temper is the exponent under which the lists,
+//! without the record, predict best where the record passes. Entries that are wrong together make it small.
 
 use rayon::prelude::*;
 
-use super::Places;
-use super::tables::Tables;
+use super::Context;
 use crate::recover::map::{Family, distance2, evenly, ln};
-use crate::recover::problem::Problem;
 use crate::seed::{Draws, Stage};
 
-/// Tempers to choose from.
 const TEMPERS: [f32; 7] = [0.14, 0.2, 0.28, 0.4, 0.56, 0.8, 1.0];
 /// The largest temper counts whose mean log-likelihood is within this many nats of the best.
 const TOLERANCE: f64 = 0.1;
 /// Number of random records that measure how often a record passes by chance.
 const BY_CHANCE: usize = 150;
-/// Largest number of places that are scored per slot.
 const MAX_PLACES: usize = 100;
 /// Probability that a list names the place at all.
 const NAMED: f64 = 0.9;
@@ -32,57 +27,46 @@ struct Named<const D: usize> {
     ratio: f64,
 }
 
-/// Returns the temper for these lists and tables.
-pub(super) fn learn<const D: usize, F: Family<D>>(
-    problem: &Problem<'_, D, F>,
-    places: &Places<D>,
-    tables: &Tables,
-) -> f32 {
-    let sample: Vec<usize> = evenly(places.n_slots(), 2000).collect();
-    let named: Vec<Vec<Named<D>>> = sample
-        .par_iter()
-        .map(|&slot| named(problem, places, tables, slot))
-        .filter(|named| named.len() > 1)
-        .collect();
-    let fit = |temper: f32| -> f64 {
-        let of_slot = |named: &Vec<Named<D>>| {
-            let most = named.iter().map(|n| n.evidence).fold(f32::NEG_INFINITY, f32::max);
-            let (mut all, mut passed) = (0.0, 0.0);
-            for n in named {
-                let p = libm::exp(f64::from(temper * (n.evidence - most)));
-                all += p;
-                passed += p * (1.0 - NAMED + NAMED * n.ratio);
-            }
-            libm::log(passed / all)
+impl<const D: usize, F: Family<D>> Context<'_, D, F> {
+    pub(super) fn learn_temper(&self) -> f32 {
+        let sample: Vec<usize> = evenly(self.places.n_slots(), 2000).collect();
+        let named = sample.into_par_iter().map(|slot| self.named(slot));
+        let mut named: Vec<Vec<Named<D>>> = named.collect();
+        named.retain(|named| named.len() > 1);
+        let fit = |temper: f32| -> f64 {
+            let of_slot = |named: &Vec<Named<D>>| {
+                let most = named.iter().map(|n| n.evidence).fold(f32::NEG_INFINITY, f32::max);
+                let (mut all, mut passed) = (0.0, 0.0);
+                for n in named {
+                    let p = libm::exp(f64::from(temper * (n.evidence - most)));
+                    all += p;
+                    passed += p * (1.0 - NAMED + NAMED * n.ratio);
+                }
+                libm::log(passed / all)
+            };
+            named.iter().map(of_slot).sum::<f64>() / named.len().max(1) as f64
         };
-        named.iter().map(of_slot).sum::<f64>() / named.len().max(1) as f64
-    };
-    let fits = TEMPERS.map(fit);
-    let best = fits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let chosen = fits.iter().rposition(|&fit| fit > best - TOLERANCE);
-    TEMPERS[chosen.unwrap_or(0)]
-}
+        let fits = TEMPERS.map(fit);
+        let best = fits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let chosen = fits.iter().rposition(|&fit| fit > best - TOLERANCE);
+        TEMPERS[chosen.unwrap_or(0)]
+    }
 
-/// Returns the places that the edges of `slot` lead to, far from each other, those with the most evidence first.
-fn named<const D: usize, F: Family<D>>(
-    problem: &Problem<'_, D, F>,
-    places: &Places<D>,
-    tables: &Tables,
-    slot: usize,
-) -> Vec<Named<D>> {
-    let edges = || problem.graph.of(slot).enumerate();
-    let best_at = |end: usize| {
-        places.of(end).max_by(|&a, &b| places.all[a].weight.total_cmp(&places.all[b].weight))
-    };
-    let width = places.typical;
-    let passes = |slot: usize, x: &[f32; D]| problem.family.is_near(slot, x, width * width);
-    let mut draws = Draws::new(problem.seed, Stage::BeliefTables, !(slot as u64));
-    let others: Vec<usize> =
-        (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
-    let mut all: Vec<Named<D>> = edges()
-        .filter_map(|(edge, (end, _))| Some((edge, places.all[best_at(end)?].x)))
-        .take(MAX_PLACES)
-        .map(|(edge, x)| {
+    /// Returns the places that the edges of `slot` lead to, far from each other, those with the most evidence first.
+    fn named(&self, slot: usize) -> Vec<Named<D>> {
+        let Self { problem, places, tables, .. } = *self;
+        let edges = || problem.graph.of(slot).enumerate();
+        let best_at = |(edge, (end, _)): (usize, (usize, u8))| {
+            let best =
+                places.all[places.of(end)].iter().max_by(|a, b| a.weight.total_cmp(&b.weight));
+            Some((edge, best?.x))
+        };
+        let width = places.typical;
+        let passes = |slot: usize, x: &[f32; D]| problem.family.is_near(slot, x, width * width);
+        let mut draws = Draws::new(problem.seed, Stage::BeliefTables, !(slot as u64));
+        let others: Vec<usize> =
+            (0..BY_CHANCE).map(|_| draws.below(places.n_slots() as u64) as usize).collect();
+        let named = |(edge, x): (usize, [f32; D])| {
             let mut evidence = 0.0;
             for (_, (end, class)) in edges().filter(|&(at, _)| at != edge) {
                 let mut ratio = 1.0;
@@ -95,15 +79,17 @@ fn named<const D: usize, F: Family<D>>(
             let chance = (by_chance as f64 + 0.5) / (BY_CHANCE + 1) as f64;
             let ratio = if passes(slot, &x) { 1.0 / chance } else { 0.0 };
             Named { x, evidence, ratio }
-        })
-        .collect();
-    all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    let mut kept: Vec<Named<D>> = Vec::new();
-    let apart = SEPARATE * width;
-    for named in all {
-        if kept.iter().all(|other| distance2(&other.x, &named.x) >= apart * apart) {
-            kept.push(named);
+        };
+        let all = edges().filter_map(best_at).take(MAX_PLACES).map(named);
+        let mut all: Vec<Named<D>> = all.collect();
+        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let mut kept: Vec<Named<D>> = Vec::new();
+        let apart = SEPARATE * width;
+        for named in all {
+            if kept.iter().all(|other| distance2(&other.x, &named.x) >= apart * apart) {
+                kept.push(named);
+            }
         }
+        kept
     }
-    kept
 }

@@ -1,9 +1,7 @@
 //! Exact constraints on exchanged coordinates: each of two records publishes the hidden coordinate of the other.
 //!
-//! A pair of partners must explain two estimates: each estimate lies near the value that the other record published. The
-//! distribution of these distances is learned together with the probabilities of pairs (expectation maximization), per class of
-//! evidence. Every record is in at most one pair, so the probabilities come from belief propagation on the
-//! monomer-dimer model, with one pass per round. No pair is fixed before the last round, so rivals keep their probability.
+//! Each of two partners' estimates lies near the value that the other published. The distribution of these distances is learned together
+//! with the probabilities of pairs (expectation maximization), by belief propagation on the monomer-dimer model.
 
 mod partners;
 
@@ -26,8 +24,7 @@ const FRACTION: (f64, f64) = (0.02, 0.995);
 /// Bins of distances from 0 to the reach: as fine as the narrowest distribution.
 const STEPS: usize = 1 << 9;
 
-/// Replaces the hidden coordinate of estimates of axis candidates by the exact value where the partner is known. Estimates on records of
-/// other families stay as they are.
+/// Replaces the hidden coordinate of estimates of axis candidates by the exact value where the partner is known.
 pub(crate) fn settle<const D: usize>(
     released: &Released<D>,
     mut estimates: Vec<Estimate<D>>,
@@ -83,7 +80,7 @@ fn pairs<const D: usize>(
     for _ in 0..ROUNDS {
         let likelier = |i: usize, j: usize| {
             let away = (sides[j].published - sides[i].estimate).abs();
-            distances.density(class[i], away) * rarity[i]
+            distances.table[class[i]][distances.step(away)] * rarity[i]
         };
         let odds = |i: usize, e: usize| {
             let j = partners.of[e] as usize;
@@ -93,7 +90,14 @@ fn pairs<const D: usize>(
             row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = odds(i, e));
         });
         let alone = distances.alone();
-        messages = next_messages(&messages, &partners, &weight, |i| alone[class[i]]);
+        let offer = |e: usize| weight[e] * messages[partners.back[e] as usize];
+        messages = partners.column(|i, row| {
+            let alone = alone[class[i]];
+            let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
+            // Rounding must not take it below the weight without any pair.
+            let message = |e: usize| 1.0 / (all - offer(e)).max(alone);
+            row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = message(e));
+        });
         let tallies = by_part(n, |records| {
             let mut tally = vec![[0.0; STEPS]; CLASSES];
             for i in records {
@@ -133,24 +137,6 @@ fn pairs<const D: usize>(
     of_record
 }
 
-/// Returns the next messages of all pairs. `weight` is that of each pair (equal in both directions), `alone` that of a record
-/// without a partner.
-fn next_messages(
-    messages: &[f32],
-    partners: &Partners,
-    weight: &[f32],
-    alone: impl Fn(usize) -> f32 + Sync,
-) -> Vec<f32> {
-    let offer = |e: usize| weight[e] * messages[partners.back[e] as usize];
-    partners.column(|i, row| {
-        let alone = alone(i);
-        let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
-        // Rounding must not take it below the weight without any pair.
-        let message = |e: usize| 1.0 / (all - offer(e)).max(alone);
-        row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = message(e));
-    })
-}
-
 #[inline(always)]
 fn probability(messages: &[f32], partners: &Partners, weight: &[f32], e: usize) -> f32 {
     // This order of the product gives the same bits in both directions.
@@ -158,8 +144,7 @@ fn probability(messages: &[f32], partners: &Partners, weight: &[f32], e: usize) 
     odds / (1.0 + odds)
 }
 
-/// Returns, per record, the inverse density of published values around its estimate: where values are rare, a value nearby is
-/// strong evidence.
+/// Returns, per record, the inverse density of published values around its estimate: a rare value nearby is strong evidence.
 fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) -> Vec<f64> {
     let half = 0.5 * reach;
     let sorted: [Vec<f32>; D] = std::array::from_fn(|axis| {
@@ -186,8 +171,7 @@ fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
     estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence)).collect()
 }
 
-/// The distribution of distances between estimates and hidden coordinates: per class, the fraction of good estimates and a
-/// mixture of normal distributions.
+/// The distribution of distances between estimates and hidden coordinates, per class: a mixture of normal distributions.
 struct Distances {
     good: [f64; CLASSES],
     weight: [[f64; SCALES]; CLASSES],
@@ -231,12 +215,6 @@ impl Distances {
     #[inline(always)]
     fn step(&self, away: f32) -> usize {
         ((away / self.reach * STEPS as f32) as usize).min(STEPS - 1)
-    }
-
-    /// Returns the density of a good estimate's distance times the fraction of good ones.
-    #[inline(always)]
-    fn density(&self, class: usize, away: f32) -> f64 {
-        self.table[class][self.step(away)]
     }
 
     /// Returns the weight of a record without a known partner, per class.

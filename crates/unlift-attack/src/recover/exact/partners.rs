@@ -11,14 +11,12 @@ use crate::recover::map::{evenly, rows_mut};
 const PART: usize = 1 << 10;
 /// Largest mean number of partners per record. A shorter reach enforces it, so that time and memory are linear in the map.
 const MOST: f64 = 16.0;
-/// Largest number of partners of one record where a shorter reach does not help, because many records have equal coordinates
-/// (a floor at 0, a few exact heights).
+/// Largest number of partners of one record where many have equal coordinates (a floor at 0), so that no reach helps.
 const MOST_OF_TIES: usize = 64;
 
 /// A record, on the axis that it is believed to have exchanged.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side {
-    /// The axis; [`LOST`] if the record was not recovered.
     pub(super) axis: usize,
     pub(super) published: f32,
     pub(super) estimate: f32,
@@ -38,8 +36,7 @@ pub(super) struct Partners {
 }
 
 impl Partners {
-    /// Finds pairs of `sides` on one axis, each of whose estimates lies within `reach` of the value that the other published. Uses a shorter
-    /// reach if there are too many pairs. `None` if there are none.
+    /// Finds pairs on one axis whose estimates lie within `reach`, or less if they are too many, of each other's published values.
     pub(super) fn find(sides: &[Side], reach: f32) -> Option<Self> {
         let mut strips = Strips::new(sides, reach);
         let mean = strips.mean();
@@ -193,8 +190,7 @@ impl<'a> Strips<'a> {
 /// Bits per value: two values and the axis make a key.
 const BITS: u32 = 20;
 
-/// Returns all records in an order in which possible partners are close in memory: two values of partners are nearly equal. A partner
-/// in the cache is read in a tenth of the time; results do not depend on the order.
+/// Returns all records in an order in which possible partners are close in memory, where they are read ten times as fast.
 pub(super) fn side_by_side(sides: &[Side], reach: f32) -> Vec<u32> {
     let low = sides.iter().map(|side| side.published.min(side.estimate)).fold(f32::MAX, f32::min);
     let cell = |value: f32| ((value - low) / reach) as u32 & ((1 << BITS) - 1);

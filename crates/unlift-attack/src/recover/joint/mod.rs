@@ -1,31 +1,22 @@
-//! Joint recovery: estimates of neighbors improve the estimate of every slot.
+//! Joint recovery: estimates of neighbors improve the estimate of every slot (docs/decisions/attack.md).
 //!
-//! Joint recovery starts from the estimates of consensus and iterates. In an iteration every slot
+//! In an iteration every slot
 //!
-//! 1. proposes candidates on its own record: its old estimate, and at most 16 projections per piece of its feasible set of
-//!    the estimates at the other ends of its edges. An edge leads to a record that the slot lists or that lists the slot's record;
+//! 1. proposes candidates on its own record: its old estimate, and projections of the estimates at the other ends of its edges;
 //! 2. scores each candidate `x` in nats by
-//!    `sum over edges j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x) + ln p_range(x)`, see below. If the best candidate
+//!    `sum over edges j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x) + ln p_range(x)`. If the best candidate
 //!    elsewhere is nearly as good, the records that pass near the two decide;
-//! 3. refines the best candidate by weighted least squares (`least_squares`). Each nearby neighbor's estimate counts fully
-//!    across its own record and less along it.
+//! 3. refines the best candidate by weighted least squares.
 //!
-//! `odds_j` are the odds that edge `j` leads to a true neighbor, `p_true` is the density of true neighbors at a distance, and
-//! `p_random` is the density of the estimates of all slots. `p_range` is the prior over ranges of rays whose center has an image
-//! region of its own; it is 1 for other records. Where wrong entries form clusters, the sums of forward and of reverse
-//! edges may differ only up to a bound (`votes`).
+//! `odds_j` are the odds that edge `j` leads to a true neighbor, `p_true` and `p_random` the densities of true neighbors and of all
+//! estimates. `p_range` is the prior over ranges of rays whose center has an image region of its own; else 1.
 //!
 //! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
-//! best candidate leads by a clear margin is updated again only if enough neighbors have jumped nearby since the last turn. `odds`,
-//! `p_true` and `p_random` are learned from the current estimates (`neighbor_distribution`, `map::grid`), and again after
-//! enough slots have jumped. Iterations end when few slots jump, when the number of jumps hardly falls, when fewer records pass
-//! near the estimates than before, or after 16 iterations.
+//! best candidate leads by a clear margin is updated again only if enough neighbors have jumped nearby since the last turn.
 //!
 //! All slots of a turn read the old estimates, so the result depends neither on order nor on threads. If all slots moved in one
-//! turn, two neighbors could exchange places forever. So even and odd slots take turns. Only the first iteration moves all
-//! slots in one turn.
+//! turn, two neighbors could exchange places forever. So even and odd slots take turns after the first iteration.
 
-mod least_squares;
 mod neighbor_distribution;
 mod update;
 mod votes;
@@ -34,7 +25,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use crate::recover::joint::neighbor_distribution::NeighborDistribution;
+use crate::recover::joint::neighbor_distribution::{Learning, REACH};
 use crate::recover::joint::update::{Context, TUBE};
 use crate::recover::map::{
     Density, Family, along_curve, distance2, evenly, record_of, solve_slots,
@@ -47,16 +38,13 @@ const ITERATIONS: usize = 16;
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// Smoothing width of the density of estimates, in radii: wide, so that a few estimates at one place hardly change it.
 const SMOOTH: f32 = 4.5;
-/// A slot is updated again once its margin is at most this many nats per jump of a neighbor. One jump can change the score by more,
-/// but some jumps confirm the place.
+/// A slot is updated again once its margin is at most this many nats per jump of a neighbor: some jumps confirm the place.
 const MARGIN_PER_JUMP: f32 = 2.0;
 /// Iterations end when fewer than this fraction of the slots jump.
 const SETTLED: f64 = 0.03;
-/// Distribution and density are learned again after more than this fraction of the slots have jumped. Learning once per
-/// iteration makes maps of paired lines and of planes worse.
+/// Distribution and density are learned again after more than this fraction of slots have jumped; once per iteration is too rare.
 const STALE: f64 = 0.02;
-/// Iterations end when fewer than half of the slots jump, but more than this fraction of the number in the iteration before.
-/// Both numbers count all jumps, whichever slots they are of.
+/// Iterations end when fewer than half of the slots jump, but more than this fraction of the number before.
 const SLOW: f64 = 0.9;
 /// Iterations end when agreement falls by more than this fraction of its best value; smaller changes are noise.
 const WORSE: f64 = 0.08;
@@ -74,8 +62,8 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     let least_radius = (ROUNDING * farthest).max(f32::MIN_POSITIVE);
     let learn = |estimates: &[Estimate<D>], radius: f32| {
         let density = Density::new(estimates, &problem.listed, SMOOTH * radius);
-        let neighbors =
-            NeighborDistribution::learn(problem, estimates, &density, radius, least_radius);
+        let learning = Learning { problem, estimates, density: &density, reach: REACH * radius };
+        let neighbors = learning.distribution(least_radius);
         (density, neighbors)
     };
     let (mut density, mut neighbors) = learn(&start, F::MOST_RADIUS * problem.delta);
@@ -117,10 +105,10 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             for (slot, (new, lead)) in slots.into_iter().zip(moved) {
                 let old = std::mem::replace(&mut estimates[slot], new);
                 let is_far = distance2(&old.position, &new.position) > neighbors.radius.powi(2);
-                margin[slot] = lead;
-                if is_far || old.status != new.status {
-                    // It is updated again in any case.
-                    margin[slot] = 0.0;
+                let jumps = is_far || old.status != new.status;
+                // A slot that jumped is updated again in any case.
+                margin[slot] = if jumps { 0.0 } else { lead };
+                if jumps {
                     jumped.push((slot, [old.position, new.position]));
                 }
             }
@@ -159,8 +147,7 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     accepted
 }
 
-/// Returns the mean number of records at the ends of a slot's edges that pass within delta of its estimate, minus the number
-/// expected by chance.
+/// Returns the mean number of records at the ends of a slot's edges within delta of its estimate, beyond chance.
 ///
 /// Agreement is measured on records, because neighboring estimates can drift together and still agree with each other.
 fn agreement<const D: usize, F: Family<D>>(

@@ -1,8 +1,7 @@
 //! The distribution of true neighbors' estimates around a point, learned from the map itself.
 //!
-//! Edges lead to true neighbors, whose estimates lie close, and to other records, whose estimates are as dense as estimates are
-//! anywhere. The number of close edges beyond chance gives the fraction of true neighbors in each class of edges and the radius
-//! that holds half of them. Their density is modeled as proportional to `(1 + r^2 / a^2)^-3`, which has a heavy tail.
+//! Edges lead to true neighbors, whose estimates lie close, and to other records. The number of close edges beyond chance gives the
+//! fraction of true neighbors in each class of edges, and their radius. Their density is modeled as proportional to `(1 + r^2 / a^2)^-3`.
 
 use rayon::prelude::*;
 
@@ -13,7 +12,7 @@ use crate::recover::problem::{Problem, RANDOM, Sampled};
 use crate::recover::result::Estimate;
 
 /// True neighbors are counted within this many radii, which hold nearly all of them.
-const REACH: f32 = 4.0;
+pub(super) const REACH: f32 = 4.0;
 /// Number of bins of the distance, from 0 to the reach: 12 per radius.
 const BINS: usize = 48;
 /// First bin of distances too large for true neighbors: three radii.
@@ -22,18 +21,15 @@ const OUTSIDE: usize = BINS / 4 * 3;
 const ENOUGH: f64 = 250.0;
 /// Mutual edges give the radius if theirs is below this fraction of the radius of all edges.
 const TIGHTER: f64 = 0.65;
-/// Fraction of true neighbors that is lost with their tail when the background is subtracted, measured on maps with uniform
-/// noise in the lists.
+/// Fraction of true neighbors that is lost with their tail when the background is subtracted, measured with uniform noise.
 const TAIL: f64 = 0.1;
 /// Bounds of the fraction of true neighbors in a class, so that odds are neither 0 nor infinite.
 const FRACTION: (f64, f64) = (5e-4, 0.95);
 
 /// The learned distribution of true neighbors. Lengths are divided by the local stretch, [`Density::stretch`].
-#[derive(Clone, Debug)]
 pub(super) struct NeighborDistribution {
     /// Radius that holds half of the true neighbors' estimates.
     pub(super) radius: f32,
-    /// Odds that an edge leads to a true neighbor, per class.
     pub(super) odds: [f32; CLASSES],
     /// Fraction of true neighbors among the estimates at the ends of edges.
     pub(super) fraction: f32,
@@ -42,55 +38,24 @@ pub(super) struct NeighborDistribution {
     pub(super) density_at_zero: f32,
     /// Density of wrong entries that lie in the same region of the map, times the odds of an entry; uniform within the reach.
     pub(super) background: f32,
-    /// Bound on the imbalance of forward and reverse edges, in nats, see [`Near::balanced_log_likelihood`]; infinite where
-    /// wrong entries form no clusters.
-    ///
-    /// [`Near::balanced_log_likelihood`]: super::votes::Near::balanced_log_likelihood
+    /// Bound on the imbalance of forward and reverse edges, in nats; infinite where wrong entries form no clusters.
     pub(super) most_imbalance: f32,
 }
 
 impl NeighborDistribution {
-    /// Learns the distribution from `estimates`. Neighbors are counted within [`REACH`] times `radius`; the learned radius is at
-    /// least `least_radius`.
-    pub(super) fn learn<const D: usize, F: Family<D>>(
-        problem: &Problem<'_, D, F>,
-        estimates: &[Estimate<D>],
-        density: &Density<D>,
-        radius: f32,
-        least_radius: f32,
-    ) -> Self {
-        let learning = Learning { problem, estimates, density, reach: REACH * radius };
-        let part = |rows: &[Sampled]| {
-            let mut tally = Tally::ZERO;
-            for row in rows.iter().filter(|row| estimates[row.slot].is_known()) {
-                learning.count(row, &mut tally);
-            }
-            tally
-        };
-        // The length is fixed, so sums do not depend on the number of threads.
-        let parts: Vec<Tally> = problem.sample.par_chunks(256).map(part).collect();
-        let mut total = Tally::ZERO;
-        parts.iter().for_each(|part| total.merge(part));
-        let limits = (least_radius, F::MOST_RADIUS * problem.delta);
-        total.distribution::<D, F>(problem.graph, &learning, limits)
-    }
-
-    /// Per class, the odds that one end of an edge is a true neighbor. An edge to a record with two slots has two ends, each with half of
-    /// the odds.
+    /// Per class, the odds that one end of an edge is a true neighbor: half of the odds if it leads to two slots.
     pub(super) fn odds_per_end(&self, graph: &Graph) -> [f32; CLASSES] {
-        std::array::from_fn(|class| match graph.is_either(class as u8) {
-            true => 0.5 * self.odds[class],
-            false => self.odds[class],
-        })
+        let share = |class: usize| if graph.is_either(class as u8) { 0.5 } else { 1.0 };
+        std::array::from_fn(|class| share(class) * self.odds[class])
     }
 }
 
-struct Learning<'a, const D: usize, F: Family<D>> {
-    problem: &'a Problem<'a, D, F>,
-    estimates: &'a [Estimate<D>],
-    density: &'a Density<D>,
+pub(super) struct Learning<'a, const D: usize, F: Family<D>> {
+    pub(super) problem: &'a Problem<'a, D, F>,
+    pub(super) estimates: &'a [Estimate<D>],
+    pub(super) density: &'a Density<D>,
     /// True neighbors are counted within this length times the local stretch.
-    reach: f32,
+    pub(super) reach: f32,
 }
 
 impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
@@ -132,10 +97,74 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
         }
     }
 
+    /// Returns the learned distribution; its radius is at least `least_radius`.
+    pub(super) fn distribution(&self, least_radius: f32) -> NeighborDistribution {
+        let Self { problem: Problem { graph, delta, sample, .. }, reach, .. } = *self;
+        let part = |rows: &[Sampled]| {
+            let mut tally = Tally::ZERO;
+            for row in rows.iter().filter(|row| self.estimates[row.slot].is_known()) {
+                self.count(row, &mut tally);
+            }
+            tally
+        };
+        // The length is fixed, so sums do not depend on the number of threads.
+        let parts: Vec<Tally> = sample.par_chunks(256).map(part).collect();
+        let mut tally = Tally::ZERO;
+        parts.iter().for_each(|part| tally.merge(part));
+        let [(all, fraction_of_all), (mutual, fraction_of_mutual)] =
+            [0, 1].map(|kind| tally.excess::<D>(kind));
+        let mut radius = median_radius(&all);
+        // Wrong entries in the same region are rarely mutual.
+        if mutual.iter().sum::<f64>() >= ENOUGH && median_radius(&mutual) < TIGHTER * radius {
+            radius = median_radius(&mutual);
+        }
+        let radius = (radius as f32 * reach).min(F::MOST_RADIUS * delta).max(least_radius);
+        // The radius that holds half of the mass of `(1 + r^2)^-3`, the mass, and the volume of the unit ball.
+        let (median, mass, ball) = match D {
+            2 => (0.643_594_25, std::f32::consts::PI / 2.0, std::f64::consts::PI),
+            _ => (
+                1.0,
+                std::f32::consts::PI * std::f32::consts::PI / 4.0,
+                4.0 / 3.0 * std::f64::consts::PI,
+            ),
+        };
+        let a = radius / median;
+        let chance = tally.random.map(close_fraction);
+        let mut odds = [0.0; CLASSES];
+        let (mut edges, mut ends, mut neighbors, mut n_background) = (0.0, 0.0, 0.0, 0.0);
+        for (class, of_class) in tally.classes.iter().enumerate() {
+            let is_either = graph.is_either(class as u8);
+            let close = true_fraction(close_fraction(*of_class), chance[usize::from(is_either)]);
+            let of_close = match side(class as u8) {
+                _ if !F::SUBTRACTS_BACKGROUND => 1.0,
+                Side::Mutual => fraction_of_mutual,
+                Side::Forward | Side::Reverse => fraction_of_all,
+            };
+            let p = (close * of_close).max(FRACTION.0);
+            odds[class] = (p / (1.0 - p)) as f32;
+            let n = of_class[0];
+            edges += n;
+            // Of the two slots of a record, only one can be a neighbor.
+            ends += if is_either { 2.0 * n } else { n };
+            neighbors += n * close;
+            n_background += n * close * (1.0 - of_close);
+        }
+        let background = (n_background / f64::max(edges, 1.0)).min(FRACTION.1);
+        let volume = ball * f64::from(reach).powi(D as i32);
+        NeighborDistribution {
+            radius,
+            fraction: (neighbors / f64::max(ends, 1.0)) as f32,
+            odds,
+            inverse_a2: 1.0 / (a * a),
+            density_at_zero: 1.0 / (mass * a.powi(D as i32)),
+            background: (background / (1.0 - background) / volume) as f32,
+            most_imbalance: self.most_imbalance(),
+        }
+    }
+
     /// Returns the bound on the imbalance of forward and reverse edges, in nats; infinite where wrong entries form no clusters.
     ///
-    /// Uniformly wrong entries stand alone. Records with similar descriptors are wrong together: a list with one of them holds
-    /// others beside it, so that their place gathers as much evidence as the right one. But those records do not list back.
+    /// Records with similar descriptors are wrong together: a list with one of them holds others. But they do not list back.
     fn most_imbalance(&self) -> f32 {
         let place = |slot: usize| self.estimates[slot].position;
         let (mut entries, mut companions) = (0.0, 0.0);
@@ -171,8 +200,7 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
 
 /// An entry is far if its distance from the slot's estimate exceeds this many times the reach.
 const ELSEWHERE: f32 = 2.0;
-/// Wrong entries form clusters if the mean number of other forward entries near a far forward entry exceeds this, beyond
-/// chance. The mean is over all checked entries; entries that are not far count as 0.
+/// Wrong entries form clusters if a checked entry, if far, has a mean number of forward entries beside it beyond chance above this.
 const LEAST_COMPANIONS: f64 = 0.25;
 /// The bound for lists whose wrong entries form clusters, in nats.
 const MOST_IMBALANCE: f32 = 10.0;
@@ -200,8 +228,7 @@ impl Tally {
         add(&mut self.random, &part.random);
     }
 
-    /// Returns close edges beyond chance and background per bin, and their fraction among close edges beyond chance. `kind` is 0
-    /// for all edges, 1 for mutual ones.
+    /// Returns close edges beyond chance and background per bin, and their fraction among those beyond chance, for all or mutual edges.
     fn excess<const D: usize>(&self, kind: usize) -> ([f64; BINS], f64) {
         let bins = &self.bins[kind];
         let of_kind = |class: &usize| kind == 0 || side(*class as u8) == Side::Mutual;
@@ -222,55 +249,6 @@ impl Tally {
         let fraction = neighbors.iter().sum::<f64>() / excess.iter().sum::<f64>().max(1.0);
         (neighbors, (fraction / (1.0 - TAIL)).min(1.0))
     }
-
-    fn distribution<const D: usize, F: Family<D>>(
-        &self,
-        graph: &Graph,
-        learning: &Learning<'_, D, F>,
-        (least_radius, most_radius): (f32, f32),
-    ) -> NeighborDistribution {
-        let reach = learning.reach;
-        let [(all, fraction_of_all), (mutual, fraction_of_mutual)] =
-            [0, 1].map(|kind| self.excess::<D>(kind));
-        let mut radius = median_radius(&all);
-        // Wrong entries in the same region are rarely mutual.
-        if mutual.iter().sum::<f64>() >= ENOUGH && median_radius(&mutual) < TIGHTER * radius {
-            radius = median_radius(&mutual);
-        }
-        let radius = (radius as f32 * reach).min(most_radius).max(least_radius);
-        let (median, mass) = profile(D);
-        let a = radius / median;
-        let chance = self.random.map(close_fraction);
-        let mut odds = [0.0; CLASSES];
-        let (mut edges, mut ends, mut neighbors, mut n_background) = (0.0, 0.0, 0.0, 0.0);
-        for (class, of_class) in self.classes.iter().enumerate() {
-            let is_either = graph.is_either(class as u8);
-            let close = true_fraction(close_fraction(*of_class), chance[usize::from(is_either)]);
-            let of_close = match side(class as u8) {
-                _ if !F::SUBTRACTS_BACKGROUND => 1.0,
-                Side::Mutual => fraction_of_mutual,
-                Side::Forward | Side::Reverse => fraction_of_all,
-            };
-            let p = (close * of_close).max(FRACTION.0);
-            odds[class] = (p / (1.0 - p)) as f32;
-            let n = of_class[0];
-            edges += n;
-            // Of the two slots of a record, only one can be a neighbor.
-            ends += if is_either { 2.0 * n } else { n };
-            neighbors += n * close;
-            n_background += n * close * (1.0 - of_close);
-        }
-        let background = (n_background / f64::max(edges, 1.0)).min(FRACTION.1);
-        NeighborDistribution {
-            radius,
-            fraction: (neighbors / f64::max(ends, 1.0)) as f32,
-            odds,
-            inverse_a2: 1.0 / (a * a),
-            density_at_zero: 1.0 / (mass * a.powi(D as i32)),
-            background: (background / (1.0 - background) / ball_volume(D, reach)) as f32,
-            most_imbalance: learning.most_imbalance(),
-        }
-    }
 }
 
 fn close_fraction([edges, close]: [f64; 2]) -> f64 {
@@ -290,23 +268,7 @@ fn median_radius(excess: &[f64; BINS]) -> f64 {
     0.5
 }
 
-/// Returns the fraction of true neighbors among edges. All true neighbors are close, and of other edges the fraction `chance`;
-/// `close` is the fraction of all edges that are close.
+/// Returns the fraction of true neighbors among edges. All of them are close, and of other edges the fraction `chance`.
 fn true_fraction(close: f64, chance: f64) -> f64 {
     ((close - chance) / (1.0 - chance.min(0.99))).clamp(FRACTION.0, FRACTION.1)
-}
-
-fn ball_volume(dimensions: usize, radius: f32) -> f64 {
-    use std::f64::consts::PI;
-    let unit = if dimensions == 2 { PI } else { 4.0 / 3.0 * PI };
-    unit * f64::from(radius).powi(dimensions as i32)
-}
-
-/// Returns the radius that holds half of the mass of `(1 + r^2)^-3`, and the mass.
-fn profile(dimensions: usize) -> (f32, f32) {
-    use std::f32::consts::PI;
-    match dimensions {
-        2 => (0.643_594_25, PI / 2.0),
-        _ => (1.0, PI * PI / 4.0),
-    }
 }

@@ -65,8 +65,7 @@ impl<const D: usize> Ends<D> {
         self.slot.len()
     }
 
-    /// Copies the estimates within `reach` of `piece` to `near`, with their odds, except those within `center_radius` of the
-    /// center of a ray.
+    /// Copies the estimates within `reach` of `piece` to `near`, except those within `center_radius` of the center of a ray.
     #[inline(always)]
     pub(super) fn near(
         &mut self,
@@ -107,8 +106,16 @@ impl<const D: usize> Ends<D> {
             near.odds[to] = odds.of_class[usize::from(class)];
             (near.side[to], near.slot[to]) = (side(class), self.slot[i]);
         }
-        if let Some((partner, distribution)) = &odds.partner {
-            near.discount(partner, *distribution);
+        // Reverse edges may belong to the other slot of the record: the better its place explains them.
+        if let Some((partner, (gain, inverse_a2))) = odds.partner {
+            let columns = near.x.first(n_kept);
+            let (odds, side) = (&mut near.odds[..n_kept], &near.side[..n_kept]);
+            for i in 0..n_kept {
+                let r2 = distance2(&partner, &std::array::from_fn(|c| columns[c][i]));
+                let q = 1.0 / (1.0 + r2 * inverse_a2);
+                let may_be_partner = if side[i] == Side::Reverse { 1.0 } else { 0.0 };
+                odds[i] /= 1.0 + may_be_partner * odds[i] * gain * q * q * q;
+            }
         }
         near.resize(n_kept.next_multiple_of(LANES), PADDING_COORDINATE);
     }
@@ -131,20 +138,6 @@ impl<const D: usize> Near<D> {
         self.x.resize(n, x);
         self.odds.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
-    }
-
-    /// Discounts the odds of reverse edges, which may belong to the other slot of the record, by how well that slot's place explains them.
-    #[inline(always)]
-    fn discount(&mut self, partner: &[f32; D], (gain, inverse_a2): (f32, f32)) {
-        let n = self.odds.len();
-        let columns = self.x.first(n);
-        let (odds, side) = (&mut self.odds[..n], &self.side[..n]);
-        for i in 0..n {
-            let r2 = distance2(partner, &std::array::from_fn(|c| columns[c][i]));
-            let q = 1.0 / (1.0 + r2 * inverse_a2);
-            let may_be_partner = if side[i] == Side::Reverse { 1.0 } else { 0.0 };
-            odds[i] /= 1.0 + may_be_partner * odds[i] * gain * q * q * q;
-        }
     }
 
     #[inline(always)]
@@ -194,8 +187,7 @@ impl<const D: usize> Near<D> {
         sums.iter().sum()
     }
 
-    /// Returns the log-likelihood ratio with a bound: the sums of forward and of reverse edges differ by at most `most_imbalance`
-    /// plus the sum of mutual edges; the rest is cut off.
+    /// Returns the log-likelihood ratio without that by which forward and reverse edges differ by more than the bound plus mutual ones.
     #[inline(always)]
     pub(super) fn balanced_log_likelihood(
         &self,

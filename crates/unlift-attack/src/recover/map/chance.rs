@@ -1,8 +1,7 @@
 //! The chance that a random listed record passes near a place.
 //!
-//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`: the expected length of lines per
-//! volume, times the volume per length of a tube of radius `delta`. Each record counts as often as it is listed. The density varies
-//! over the size of a room, not over `delta`, so a coarse grid suffices for every delta.
+//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`: the expected length of lines per volume, as
+//! often as each is listed, times the volume per length of a tube. A coarse grid suffices, because density varies over the size of a room.
 
 use rayon::prelude::*;
 
@@ -18,8 +17,6 @@ pub(crate) const CELLS: usize = 1 << 15;
 /// Least density, as a fraction of the mean: with chance near 0, a single vote would decide.
 const FLOOR: f32 = 0.05;
 
-/// Density of records per cell.
-#[derive(Clone, Debug)]
 pub(crate) struct ChanceField<const D: usize> {
     pub(crate) grid: Grid<D>,
 }
@@ -38,10 +35,8 @@ impl<const D: usize> ChanceField<D> {
 
     /// Returns the density at a typical place: the mean over places weighted by density.
     pub(crate) fn typical(&self) -> f32 {
-        let values = self.grid.values.iter().map(|&x| f64::from(x));
-        let add = |(sum, squares): (f64, f64), x: f64| (sum + x, squares + x * x);
-        let (sum, squares) = values.fold((0.0, 0.0), add);
-        (squares / sum) as f32
+        let values = || self.grid.values.iter().map(|&x| f64::from(x));
+        (values().map(|x| x * x).sum::<f64>() / values().sum::<f64>()) as f32
     }
 
     /// Returns the chance that a random record passes through a tube about `x`; `tube` is its volume per length.
@@ -68,12 +63,7 @@ impl<const D: usize> ChanceField<D> {
 
 /// Returns the volume per length of the tube of radius `delta` around a line.
 pub(crate) fn tube(dimensions: usize, delta: f32) -> f32 {
-    // The volume of the unit ball in D - 1 dimensions.
-    match dimensions {
-        0 | 1 => 1.0,
-        2 => 2.0 * delta,
-        _ => std::f32::consts::PI * delta * delta,
-    }
+    if dimensions == 2 { 2.0 * delta } else { std::f32::consts::PI * delta * delta }
 }
 
 /// Returns the fields of lines (one) or of rays (one per center, from the rays of the other centers).
@@ -85,7 +75,15 @@ pub(crate) fn of_lines<const D: usize>(
     // The centers up to the last one that has a ray; none for lines.
     let rays = rows.iter().filter(|row| row.is_ray());
     let n_groups = rays.map(|row| row.group + 1).max();
-    let (low, high) = box_of_crossings(rows, lists, slots_per_record);
+    let crossings = |slot: usize| {
+        let own = &rows[slot / slots_per_record];
+        // Lists are in order of record, which is random, so any entries will do.
+        let listed = lists.of(slot).iter().take(2);
+        listed.filter_map(|record| own.crossing(&rows[record.index()]))
+    };
+    // Enough for a quantile of 3 %.
+    let places: Vec<_> = evenly(lists.n_slots(), 1 << 12).flat_map(crossings).collect();
+    let (low, high) = trimmed_box(&places);
     let counts = times_listed(lists, rows.len());
     let field = |own: u32| {
         let of_others = |&record: &usize| n_groups.is_none() || rows[record].group != own;
@@ -93,7 +91,21 @@ pub(crate) fn of_lines<const D: usize>(
         let chosen: Vec<usize> = evenly(rows.len(), CELLS).filter(of_others).collect();
         let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
         let mut total = Grid::over(low, high, CELLS);
-        let lengths = |records: &[usize]| lengths(total.clone(), rows, &counts, records);
+        // Adds the lengths of some records, each as often as it is listed.
+        let lengths = |records: &[usize]| {
+            let mut grid = total.clone();
+            for &record in records {
+                let (row, weight) = (&rows[record], counts[record] as f32);
+                let Some((from, to)) = grid.clip(row) else { continue };
+                let steps = ((to - from) / grid.cell).ceil().max(1.0);
+                let step = (to - from) / steps;
+                for i in 0..steps as i32 {
+                    let cell = grid.index(&row.at(from + (i as f32 + 0.5) * step));
+                    grid.values[cell] += weight * step;
+                }
+            }
+            grid
+        };
         // Eight parts for any number of threads, so that the order of sums is fixed.
         let parts: Vec<Grid<D>> =
             chosen.par_chunks(chosen.len().div_ceil(8).max(1)).map(lengths).collect();
@@ -105,60 +117,15 @@ pub(crate) fn of_lines<const D: usize>(
     (0..n_groups.unwrap_or(1)).map(field).collect()
 }
 
-/// Adds the lengths of some records, each as often as it is listed, to a grid.
-fn lengths<const D: usize>(
-    mut grid: Grid<D>,
-    rows: &[LineRow<D>],
-    counts: &[u32],
-    records: &[usize],
-) -> Grid<D> {
-    let (mut t, mut cells) = (Vec::new(), Vec::new());
-    for &record in records {
-        let (row, weight) = (&rows[record], counts[record] as f32);
-        let inside = grid.clip(&row.through, &row.direction, row.floor(), row.to);
-        let Some((from, to)) = inside else { continue };
-        let steps = ((to - from) / grid.cell).ceil().max(1.0);
-        let step = (to - from) / steps;
-        t.clear();
-        t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
-        cells.resize(t.len(), 0);
-        grid.cells_along(&row.through, &row.direction, &t, &mut cells);
-        for &cell in &cells {
-            grid.values[cell as usize] += weight * step;
-        }
-    }
-    grid
-}
-
-/// Returns how many lists name each record.
 pub(crate) fn times_listed(lists: &Neighborhoods, n_records: usize) -> Vec<u32> {
     let mut counts = vec![0; n_records];
     lists.records().iter().for_each(|record| counts[record.index()] += 1);
     counts
 }
 
-/// Returns a box around most places where records pass closest to slots that list them.
-fn box_of_crossings<const D: usize>(
-    rows: &[LineRow<D>],
-    lists: &Neighborhoods,
-    slots_per_record: usize,
-) -> ([f32; D], [f32; D]) {
-    let crossings = |slot: usize| {
-        let own = &rows[slot / slots_per_record];
-        // Lists are in order of record, which is random, so any entries will do.
-        let listed = lists.of(slot).iter().take(2);
-        listed.filter_map(|record| own.crossing(&rows[record.index()]))
-    };
-    // Enough for a quantile of 3 %.
-    let slots = evenly(lists.n_slots(), 1 << 12);
-    let places: Vec<[f32; D]> = slots.flat_map(crossings).collect();
-    trimmed_box(&places)
-}
-
 // Lists without information.
 
-/// Distance between the entries of a mixed list, as a fraction of all entries. The golden section spreads them evenly, so that
-/// no two come from one list.
+/// Distance between the entries of a mixed list, as a fraction of all entries: the golden section spreads them evenly.
 const SPREAD: f64 = 0.618_033_988_749_895;
 /// Entries tried per entry of a mixed list.
 const TRIES: usize = 8;
@@ -205,8 +172,7 @@ pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
 }
 
-/// Whether sorted values have separate parts: their quartiles are four times as far apart as those of evenly spread values, for which the
-/// distance is four times the width of an eighth of the values.
+/// Whether sorted values have separate parts: quartiles four times as far apart as the width of an eighth of the values tells.
 pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     let many = sorted.len() / 8;
     if many == 0 {
@@ -217,18 +183,15 @@ pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     16.0 * median(&mut widths) < interquartile_range(sorted)
 }
 
-/// Returns the median distance of the lines from their middle. Distances from the origin would depend on how a shifted or
-/// scaled map rounds its origin.
+/// Returns the median distance of the lines from their middle; that from the origin would depend on its rounding.
 pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
     // Spread over the file: a given map need not be in random order.
     let rows: Vec<&LineRow<D>> = evenly(rows.len(), 1000).map(|row| &rows[row]).collect();
     let offset = |row: &LineRow<D>, from: &[f64; D]| {
-        let (through, direction) = (widen(&row.through), widen(&row.direction));
-        let away = sub(&through, from);
+        let (away, direction) = (sub(&widen(&row.through), from), widen(&row.direction));
         along(&away, -dot(&away, &direction), &direction)
     };
-    // Each iteration moves to the mean of the lines' nearest points. The remaining error shrinks by the mean squared cosine with the
-    // lines, about a third.
+    // Each iteration moves to the mean of the lines' nearest points, and the error shrinks to about a third.
     let mut middle = [0.0; D];
     for _ in 0..60 {
         let mut step = [0.0; D];
@@ -249,11 +212,10 @@ pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
         }
     }
     let apart = |a: &LineRow<D>, b: &LineRow<D>| {
-        let apart = widen(&std::array::from_fn::<f32, D, _>(|c| a.through[c] - b.through[c]));
+        let apart: [f64; D] = std::array::from_fn(|c| f64::from(a.through[c] - b.through[c]));
         dot(&apart, &apart).sqrt()
     };
-    let pairs = centers.iter().flat_map(|a| centers.iter().map(|b| apart(a, b)));
-    pairs.fold(0.0, f64::max)
+    centers.iter().flat_map(|a| centers.iter().map(|b| apart(a, b))).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

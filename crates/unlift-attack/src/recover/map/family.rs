@@ -26,7 +26,6 @@ pub(crate) struct Piece<const D: usize> {
     pub(crate) along: [[f32; D]; D],
     /// Direction of a half-line or a chord; zero for other pieces.
     pub(crate) sense: [f32; D],
-    /// Length in that direction.
     pub(crate) to: f32,
     /// Whether the piece is a ray: a point near `through` is near all rays of that center.
     pub(crate) from_center: bool,
@@ -35,7 +34,7 @@ pub(crate) struct Piece<const D: usize> {
 impl<const D: usize> Piece<D> {
     #[inline(always)]
     pub(crate) fn line(through: [f32; D], direction: [f32; D]) -> Self {
-        let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
+        let along = direction.map(|r| direction.map(|c| r * c));
         let (sense, to) = ([0.0; D], f32::INFINITY);
         Self { through, direction, along, sense, to, from_center: false }
     }
@@ -54,10 +53,8 @@ impl<const D: usize> Piece<D> {
     }
 }
 
-/// Records of one family: where a point of theirs may be, how near they pass to a place, and how likely that is by chance. The search is
-/// generic over it.
+/// Records of one family: where a point of theirs may be, how near they pass to a place, and how likely that is by chance.
 pub(crate) trait Family<const D: usize>: Sync {
-    /// Number of pieces of each feasible set.
     const PIECES: usize = 1;
     /// Whether pieces are planes with a normal, not lines with a direction.
     const IS_PLANE: bool = false;
@@ -70,14 +67,12 @@ pub(crate) trait Family<const D: usize>: Sync {
     const ALONG: f32 = 2.0;
     /// In least squares, an estimate has half weight at this likelihood ratio of a true neighbor against chance.
     const HALF_WEIGHT_RATIO: f32 = 1.0;
-    /// Whether wrong entries of the same region count as background and not as true neighbors: along a line they would draw a place
-    /// into the middle of its region. Planes and candidates keep them, because a neighbor fixes few coordinates and more are better.
+    /// Whether wrong entries of the same region count as background: along a line they would draw a place into the middle of its region.
     const SUBTRACTS_BACKGROUND: bool = false;
     /// Largest radius of the distribution of neighbors, in deltas. Without it, the radius would grow where most estimates are wrong.
     const MOST_RADIUS: f32 = 0.95;
 
-    /// How often joint recovery runs again from exact coordinates. This improves images. On maps it gains 0.2 points and takes half as
-    /// long again.
+    /// How often joint recovery runs again from exact coordinates, which improves images.
     const RERUNS: usize = 0;
 
     // The choice of delta.
@@ -90,8 +85,7 @@ pub(crate) trait Family<const D: usize>: Sync {
     const KEEPS_TO_LIMIT: bool = false;
     /// Position of the narrow choice on the plateau, as a fraction of its logarithmic width: the very edge is noisy.
     const ACROSS: f64 = 1.0 / 3.0;
-    /// Whether a narrow delta stays near the lower edge of the plateau. In an image, lines cross everywhere, so that this edge is
-    /// noise.
+    /// Whether a narrow delta stays near the lower edge of the plateau. In an image, that edge is noise.
     const KEEPS_NEAR_EDGE: bool = D != 2;
 
     /// What consensus and joint recovery compute once for a delta.
@@ -106,8 +100,7 @@ pub(crate) trait Family<const D: usize>: Sync {
     fn extent(&self) -> f64;
     /// Returns the chance that a random record passes within `delta` of a typical place.
     fn typical_chance(&self, delta: f32) -> f32;
-    /// Returns two limits on chance for maps in which a list holds the fraction `share` of all records: a delta with less chance than
-    /// the first is never too wide, and one with less than the second is too narrow.
+    /// Returns two limits on chance, if a list holds the fraction `share` of all records: of a delta never too wide, and of one too narrow.
     ///
     /// Neighbors then lie in a ball that holds this fraction of the map. A random line passes through it with probability `share^(2/3)` if
     /// points fill space and `share^2` if they lie on a curve; a random plane with `share^(1/3)` and `share`.
@@ -286,8 +279,7 @@ impl<const D: usize> Family<D> for LineFamily<D> {
         self.field(self.own(slot)).at(x, tube)
     }
 
-    // Points are uniform over the region and rays diverge, so the prior grows with the range. Without it, estimates drift to where all
-    // bearings meet.
+    // Points are uniform and rays diverge, so the prior grows with the range. Without it, estimates drift to where all bearings meet.
     #[inline(always)]
     fn ln_spread(&self, slot: usize, x: &[f32; D]) -> f32 {
         if !self.anchored {
@@ -304,11 +296,8 @@ pub(crate) struct PlaneFamily<'a, const D: usize> {
     by_axis: [SortedPlanes; D],
 }
 
-/// The planes of one axis.
 struct SortedPlanes {
-    /// Records in order of their offsets.
     order: Vec<u32>,
-    /// Distance between the quartiles of the offsets.
     quartiles: f64,
     /// Sorted offsets if the map has separate parts along this axis, else empty.
     in_parts: Vec<f32>,
@@ -336,13 +325,12 @@ impl SortedPlanes {
             // Half of the planes lie between the quartiles.
             return (f64::from(delta) / self.quartiles.max(f64::from(f32::MIN_POSITIVE))) as f32;
         }
-        let share_within = |&at: &f32| {
-            let low = offsets.partition_point(|&offset| offset < at - delta);
-            let high = offsets.partition_point(|&offset| offset <= at + delta);
+        let share_around = |at: usize| {
+            let low = offsets.partition_point(|&offset| offset < offsets[at] - delta);
+            let high = offsets.partition_point(|&offset| offset <= offsets[at] + delta);
             (high - low) as f64 / offsets.len() as f64
         };
-        let places = evenly(offsets.len(), 1 << 10).map(|at| &offsets[at]);
-        let mut shares: Vec<f64> = places.map(share_within).collect();
+        let mut shares: Vec<f64> = evenly(offsets.len(), 1 << 10).map(share_around).collect();
         median(&mut shares) as f32
     }
 }
@@ -357,7 +345,6 @@ impl<'a, const D: usize> PlaneFamily<'a, D> {
         usize::from(self.planes.axis()[record])
     }
 
-    /// Sorts `listed` planes by axis.
     pub(crate) fn gather(&self, listed: &[RecordId], by_axis: &mut Vec<Vec<(f32, RecordId)>>) {
         by_axis.resize_with(D, Vec::new);
         by_axis.iter_mut().for_each(Vec::clear);
@@ -377,8 +364,7 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
     const ACROSS: f64 = 3.0 / 4.0;
     const KEEPS_NEAR_EDGE: bool = false;
 
-    /// Per record, the chance that a random plane of its axis has an offset in `[offset, offset + 2 delta]`, counted exactly; and the
-    /// typical chance.
+    /// Per record, the chance that a random plane of its axis is in `[offset, offset + 2 delta]`, counted exactly; and the typical chance.
     type AtDelta = (Vec<f32>, f32);
 
     fn at_delta(&self, delta: f32) -> (Vec<f32>, f32) {
@@ -433,11 +419,11 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
 
     #[inline(always)]
     fn piece(&self, slot: usize, _: usize) -> Piece<D> {
-        let (own, offset) = (self.axis(slot), self.planes.offset()[slot]);
-        let at = |c: usize| if c == own { offset } else { 0.0 };
-        let free = |r: usize| if r == own { [0.0; D] } else { unit(r) };
-        let along = std::array::from_fn(free);
-        Piece { along, ..Piece::line(std::array::from_fn(at), unit(own)) }
+        let own = self.axis(slot);
+        let mut through = [0.0; D];
+        through[own] = self.planes.offset()[slot];
+        let along = std::array::from_fn(|r| if r == own { [0.0; D] } else { unit(r) });
+        Piece { along, ..Piece::line(through, unit(own)) }
     }
 
     #[inline(always)]
@@ -458,8 +444,7 @@ impl<const D: usize> Family<D> for PlaneFamily<'_, D> {
 }
 
 /// Returns the window of width `2 delta` over the listed planes of one axis with the largest evidence plus prior: the mean of its offsets,
-/// after it was centered anew, the number of offsets that support it, and their evidence. `listed` has the (offset, record) of these planes
-/// and gets sorted; `chance` is that of a window from the offset of a record.
+/// their number, and their evidence. `listed`, (offset, record), gets sorted; `chance` is that of a window from the offset of a record.
 // Without inlining, consensus on planes takes half as long again.
 #[inline(always)]
 fn best_window(
@@ -489,9 +474,10 @@ fn best_window(
     let first = mean(&listed[start..end]);
     let low = listed.partition_point(|r| r.0 < first - REFIT * delta);
     let high = listed.partition_point(|r| r.0 <= first + REFIT * delta);
-    let (offset, count) =
-        if low < high { (mean(&listed[low..high]), high - low) } else { (first, end - start) };
-    Some((offset, count as u32, evidence))
+    Some(match low < high {
+        true => (mean(&listed[low..high]), (high - low) as u32, evidence),
+        false => (first, (end - start) as u32, evidence),
+    })
 }
 
 /// Axis candidates: published points of which one coordinate is foreign.
@@ -510,11 +496,10 @@ impl<'a, const D: usize> CandidateFamily<'a, D> {
             let (mut low, mut high) = (low, high);
             (low[axis], high[axis]) = (0.0, 0.0);
             let mut grid = Grid::over(low, high, CELLS / 8);
-            // The grid has one cell along this axis, in which the line is as long as the cell.
-            let length = grid.cell;
             for (row, &n) in rows.iter().zip(&counts) {
                 let cell = grid.index(row);
-                grid.values[cell] += n as f32 * length;
+                // The grid has one cell along this axis, in which the line is as long as the cell.
+                grid.values[cell] += n as f32 * grid.cell;
             }
             ChanceField::new(grid, weight)
         });
@@ -570,8 +555,7 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
     }
 
     fn likely_delta(&self, share: f64) -> f64 {
-        // If points lie on surfaces, one line passes as close as neighbors are with probability `share`, and a record has three lines. Lists
-        // may hold a large fraction of all records.
+        // If points lie on surfaces, one of the three lines of a record passes as close as neighbors with probability `share`.
         let least = (3.0 * share).min(0.25) as f32;
         // Chance grows with delta: bisect to more than 32 bits.
         let (mut below, mut above) = (0.0, self.extent());
@@ -587,8 +571,7 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
         f64::max(above, of_flat)
     }
 
-    /// Returns the best estimate on any axis line. Axes are compared by evidence, not by counts: along the long axis of an elongated map
-    /// more records agree by chance.
+    /// Returns the best estimate on any axis line. Axes are compared by evidence: along a long axis, more records agree by chance.
     #[inline(always)]
     fn consensus(
         &self,

@@ -1,8 +1,7 @@
 //! The neighborhood graph: which slots list which records, in both directions.
 //!
-//! A slot has edges to the records that it lists, and to the slots that list its record: both are likely neighbors. Edges fall in
-//! classes by direction (one end lists the other, or both do) and by the score of the source. Edges of one class share
-//! an inlier ratio, which recovery learns.
+//! A slot has edges to the records that it lists, and to the slots that list its record. Edges fall in classes by direction (one end lists
+//! the other, or both do) and by score. Edges of one class share an inlier ratio, which recovery learns.
 
 use std::ops::Range;
 
@@ -24,14 +23,10 @@ pub(crate) enum Side {
 const SCORE_CLASSES: usize = 8;
 /// Quantiles of all scores at which classes begin: finer at the top, where most true neighbors are.
 const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
-/// Number of scores from which these quantiles are computed.
 const SCORES: usize = 1 << 16;
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
-/// Largest number of reverse edges of a slot, as a multiple of the mean list length: a record in very many lists is in most of
-/// them by mistake.
+/// Largest number of reverse edges of a slot, in mean list lengths: a record in very many lists is in most of them by mistake.
 const MOST_REVERSE: usize = 3;
-/// Slots per parallel task.
-const PART: usize = 1 << 12;
 
 /// Returns the record of a slot. Records have one or two slots, so a shift replaces a division.
 #[inline(always)]
@@ -66,8 +61,6 @@ fn class_of(lists: &Neighborhoods, bounds: &[f32], side: Side, slot: usize, at: 
     (side as usize * SCORE_CLASSES + lists.scores().map_or(0, class)) as u8
 }
 
-/// Slots that list each record, ascending.
-#[derive(Debug)]
 pub(crate) struct Listers {
     offsets: Vec<usize>,
     slots: Vec<u32>,
@@ -98,7 +91,6 @@ impl Listers {
 }
 
 /// Edges per slot, in order of their ends, with the class of each.
-#[derive(Debug)]
 pub(crate) struct Graph {
     offsets: Vec<u64>,
     /// Slots; the first slot of a record if the edge does not specify which.
@@ -109,19 +101,18 @@ pub(crate) struct Graph {
 }
 
 impl Graph {
-    /// Creates the edges of `lists` in both directions.
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
         let listers = Listers::new(lists, n_slots / slots_per_record);
         let bounds = &score_bounds(lists);
         let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
-        let edges = |slot: usize, edges: &mut (Vec<u32>, Vec<u8>)| {
-            let mut put = |end: u32, class: u8| {
-                edges.0.push(end);
-                edges.1.push(class);
-            };
+        let edges = |slot: usize| {
+            let mut edges: Vec<(u32, u8)> = Vec::new();
             let list = lists.of(slot);
-            let own = |side: Side, at: usize| class_of(lists, bounds, side, slot, at);
+            let own = |side: Side, at: usize| {
+                let end = list[at].0 * slots_per_record as u32;
+                (end, class_of(lists, bounds, side, slot, at))
+            };
             let record = record_of(slot, slots_per_record);
             let all = listers.of(record);
             let (mut at, mut mutual) = (0, u32::MAX);
@@ -129,40 +120,29 @@ impl Graph {
             for &by in all.iter().step_by(all.len().div_ceil(most).max(1)) {
                 let theirs = record_of(by as usize, slots_per_record) as u32;
                 while at < list.len() && list[at].0 < theirs {
-                    put(list[at].0 * slots_per_record as u32, own(Side::Forward, at));
+                    edges.push(own(Side::Forward, at));
                     at += 1;
                 }
                 if at < list.len() && list[at].0 == theirs {
-                    put(theirs * slots_per_record as u32, own(Side::Mutual, at));
+                    edges.push(own(Side::Mutual, at));
                     at += 1;
                     mutual = theirs;
                 } else if mutual != theirs {
                     // If a record is mutual already, its other slot adds nothing.
                     let entry = lists.of(by as usize).partition_point(|r| r.index() < record);
-                    put(by, class_of(lists, bounds, Side::Reverse, by as usize, entry));
+                    edges.push((by, class_of(lists, bounds, Side::Reverse, by as usize, entry)));
                 }
             }
-            for (at, entry) in list.iter().enumerate().skip(at) {
-                put(entry.0 * slots_per_record as u32, own(Side::Forward, at));
-            }
-            edges.0.len() as u64
+            edges.extend((at..list.len()).map(|at| own(Side::Forward, at)));
+            edges
         };
-        let slots: Vec<usize> = (0..n_slots).step_by(PART).collect();
-        let parts: Vec<_> = slots
-            .into_par_iter()
-            .map(|first| {
-                let mut part = (Vec::new(), Vec::new());
-                let slots = first..(first + PART).min(n_slots);
-                let until: Vec<u64> = slots.map(|slot| edges(slot, &mut part)).collect();
-                (until, part)
-            })
-            .collect();
-        let (mut offsets, mut ends, mut class) = (vec![0], Vec::new(), Vec::new());
-        for (until, (part, classes)) in parts {
-            offsets.extend(until.iter().map(|until| ends.len() as u64 + until));
-            ends.extend(part);
-            class.extend(classes);
-        }
+        let rows: Vec<Vec<(u32, u8)>> = (0..n_slots).into_par_iter().map(edges).collect();
+        let mut offsets = vec![0];
+        offsets.extend(rows.iter().scan(0, |end, row| {
+            *end += row.len() as u64;
+            Some(*end)
+        }));
+        let (ends, class) = rows.into_iter().flatten().unzip();
         Self { offsets, ends, class, slots_per_record, listers }
     }
 
@@ -174,8 +154,7 @@ impl Graph {
         edges.map(|(&end, &class)| (end as usize, class))
     }
 
-    /// Whether an edge of this class leads to a record without saying which of its two slots: lists have records as entries, while
-    /// the slot that owns a list is known.
+    /// Whether an edge of this class leads to a record without saying which of its two slots: entries of lists are records.
     #[inline(always)]
     pub(crate) fn is_either(&self, class: u8) -> bool {
         self.slots_per_record == 2 && side(class) != Side::Reverse
@@ -187,7 +166,6 @@ impl Graph {
         end..end + 1 + usize::from(self.is_either(class))
     }
 
-    /// Returns the slots of a record.
     pub(crate) fn slots_of(&self, record: usize) -> Range<usize> {
         record * self.slots_per_record..(record + 1) * self.slots_per_record
     }
@@ -206,7 +184,6 @@ impl Graph {
         self.ends.len()
     }
 
-    /// Returns how many edges lead to each record.
     pub(crate) fn times_listed(&self) -> Vec<u32> {
         let mut counts = vec![0; self.n_slots() / self.slots_per_record];
         for &end in &self.ends {
@@ -248,12 +225,14 @@ mod tests {
     fn expected(
         lists: &Neighborhoods,
         per: usize,
+        bounds: &[f32],
         slot: usize,
-        of_score: &dyn Fn(usize) -> u8,
-    ) -> Vec<(u32, u8)> {
-        let class =
-            |side: Side, entry: usize| (side as usize * SCORE_CLASSES) as u8 + of_score(entry);
-        let entry = |slot: usize, at: usize| lists.offsets()[slot] as usize + at;
+    ) -> Vec<(usize, u8)> {
+        let class = |side: Side, slot: usize, at: usize| {
+            let score = lists.scores_of(slot).unwrap()[at];
+            let of_score = bounds.partition_point(|&bound| bound <= score);
+            (side as usize * SCORE_CLASSES + of_score) as u8
+        };
         let own = RecordId::from_index(slot / per);
         let place = |by: usize| Some((by, lists.of(by).iter().position(|&record| record == own)?));
         let named_by: Vec<(usize, usize)> = (0..lists.n_slots()).filter_map(place).collect();
@@ -264,13 +243,10 @@ mod tests {
         for (at, record) in list.iter().enumerate() {
             let is_mutual = reverse.clone().any(|by| by.0 / per == record.index());
             let side = if is_mutual { Side::Mutual } else { Side::Forward };
-            edges.push((record.0 * per as u32, class(side, entry(slot, at))));
+            edges.push((record.index() * per, class(side, slot, at)));
         }
-        for &(by, at) in reverse {
-            if !list.contains(&RecordId::from_index(by / per)) {
-                edges.push((by as u32, class(Side::Reverse, entry(by, at))));
-            }
-        }
+        let only = reverse.filter(|by| !list.contains(&RecordId::from_index(by.0 / per)));
+        edges.extend(only.map(|&(by, at)| (by, class(Side::Reverse, by, at))));
         edges.sort_unstable_by_key(|edge| edge.0);
         edges
     }
@@ -278,23 +254,19 @@ mod tests {
     #[test]
     fn edges_are_those_computed_one_by_one() {
         for per in [1, 2] {
-            let lists = lists(2 * PART + 77, per);
+            let lists = lists(2_000, per);
             let on = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| Graph::new(&lists, per))
             };
             let (single, parallel) = (on(1), on(3));
             let bounds = score_bounds(&lists);
-            let scores = lists.scores().unwrap();
-            let of_score =
-                |entry: usize| bounds.partition_point(|&bound| bound <= scores[entry]) as u8;
             let mut n_edges = 0;
             for slot in 0..lists.n_slots() {
-                let expected = expected(&lists, per, slot, &of_score);
+                let expected = expected(&lists, per, &bounds, slot);
                 n_edges += expected.len();
                 for graph in [&single, &parallel] {
-                    let edges = graph.of(slot).map(|(end, class)| (end as u32, class));
-                    assert_eq!(edges.collect::<Vec<_>>(), expected, "slot {slot}");
+                    assert_eq!(graph.of(slot).collect::<Vec<_>>(), expected, "slot {slot}");
                 }
             }
             assert_eq!([single.len(), parallel.len()], [n_edges; 2]);

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::recover::map::graph::record_of;
+use crate::recover::map::lines::LineRow;
 use crate::recover::map::places::{sample, trimmed_box};
 use crate::recover::result::Estimate;
 
@@ -44,15 +45,6 @@ impl<const D: usize> Grid<D> {
         Self::of_cells(low, high, cell as f32)
     }
 
-    /// Creates empty cells of a given size over the box from `low` to `high`; larger cells if there would be more than `most`.
-    fn with_cell(low: [f32; D], high: [f32; D], cell: f32, most: usize) -> Self {
-        let side = |c: usize| f64::from((high[c] - low[c]) / cell).ceil().max(1.0);
-        match (0..D).map(side).product::<f64>() <= most as f64 {
-            true => Self::of_cells(low, high, cell),
-            false => Self::over(low, high, most),
-        }
-    }
-
     fn of_cells(low: [f32; D], high: [f32; D], cell: f32) -> Self {
         let side = |c: usize| (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20);
         Self::even(low, cell, std::array::from_fn(side), 0.0)
@@ -84,8 +76,7 @@ impl<const D: usize> Grid<D> {
         let mut number = 0;
         for c in 0..D {
             let at = ((x(c) - self.low[c]) * self.per_length - 0.5).max(0.0).min(self.last[c]);
-            // Adding a large number rounds to an integer: a cast that handles infinities is no vector instruction. A place exactly between
-            // two cells may get either.
+            // Adding a large number rounds to an integer; a cast that handles infinities is no vector instruction.
             let whole = (at + ROUNDING).to_bits() - ROUNDING.to_bits();
             number = number * self.dims[c] as u32 + whole;
         }
@@ -137,14 +128,9 @@ impl<const D: usize> Grid<D> {
         (index, weight)
     }
 
-    /// Returns the part `[from, to]` of the line `through + t direction` inside the box, if any.
-    pub(crate) fn clip(
-        &self,
-        through: &[f32; D],
-        direction: &[f32; D],
-        mut from: f32,
-        mut to: f32,
-    ) -> Option<(f32, f32)> {
+    /// Returns the part `[from, to]` of a row inside the box, if any.
+    pub(crate) fn clip(&self, row: &LineRow<D>) -> Option<(f32, f32)> {
+        let (LineRow { through, direction, .. }, mut from, mut to) = (row, row.floor(), row.to);
         for c in 0..D {
             let (low, high) = (self.low[c], self.low[c] + self.cell * self.dims[c] as f32);
             if direction[c].abs() < 1e-12 {
@@ -207,7 +193,11 @@ impl<const D: usize> Density<D> {
         let n = estimates.len();
         let places = sample(estimates);
         let (low, high) = trimmed_box(&places);
-        let mut grid = Grid::with_cell(low, high, radius * CELL, (4 * n).max(1 << 16));
+        let (cell, most) = (radius * CELL, (4 * n).max(1 << 16));
+        let side = |c: usize| f64::from((high[c] - low[c]) / cell).ceil().max(1.0);
+        let fits = (0..D).map(side).product::<f64>() <= most as f64;
+        let mut grid =
+            if fits { Grid::of_cells(low, high, cell) } else { Grid::over(low, high, most) };
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
         for (slot, estimate) in estimates.iter().enumerate() {
@@ -227,11 +217,8 @@ impl<const D: usize> Density<D> {
             *value = value.max(least) * scale;
         }
         let mut densities: Vec<f32> = places.iter().map(|x| grid.at(x)).collect();
-        let middle = densities.len() / 2;
-        let typical = match densities.is_empty() {
-            true => scale,
-            false => *densities.select_nth_unstable_by(middle, f32::total_cmp).1,
-        };
+        densities.sort_unstable_by(f32::total_cmp);
+        let typical = densities.get(densities.len() / 2).copied().unwrap_or(scale);
         Self { grid, typical }
     }
 
@@ -240,9 +227,7 @@ impl<const D: usize> Density<D> {
         self.grid.at(x)
     }
 
-    /// Returns the local stretch: how many times larger the distance to neighbors is than at a typical place. Lists are equally long
-    /// everywhere, so neighbors lie farther away where the density is low. Dense places get 1, because the grid does not resolve them.
-    /// The cube root is right in three dimensions; two dimensions use it, too.
+    /// Returns how many times larger the distance to neighbors is than at a typical place (the cube root, also in 2D). Dense places get 1.
     #[inline(always)]
     pub(crate) fn stretch(&self, density: f32) -> f32 {
         let ratio = self.typical / density;
@@ -250,8 +235,7 @@ impl<const D: usize> Density<D> {
     }
 }
 
-/// In cells of `grid` with less than `enough`, replaces the value by that of the narrowest wider smoothing with as many estimates
-/// in its neighborhood.
+/// In cells of `grid` with less than `enough`, replaces the value by that of the narrowest wider smoothing that has enough.
 fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
     let mut wide = grid.clone();
     let mut open: Vec<u32> =
@@ -266,8 +250,7 @@ fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
     }
 }
 
-/// Edge of a cell in radii. Linear distribution, smoothing and lookup by cell together have the variance of the kernel
-/// `1 - r^2 / radius^2` in three dimensions.
+/// Edge of a cell in radii: distribution, smoothing and lookup have the variance of the kernel `1 - r^2 / radius^2` in 3D.
 const CELL: f32 = 0.436;
 
 /// Returns the cube root of a number above 1, to 1e-3: two Newton steps from an exponent divided by three.

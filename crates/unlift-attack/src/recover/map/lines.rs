@@ -157,7 +157,6 @@ impl<const D: usize> Columns<D> {
         self.0.iter_mut().for_each(|column| column.resize(n, x));
     }
 
-    /// Fills the columns with one row per item.
     #[inline(always)]
     pub(crate) fn fill<T>(&mut self, items: &[T], row: impl Fn(&T) -> [f32; D]) {
         self.resize(items.len(), 0.0);
@@ -167,14 +166,12 @@ impl<const D: usize> Columns<D> {
         }
     }
 
-    /// Returns the first `n` rows.
     #[inline(always)]
     pub(crate) fn first(&self, n: usize) -> [&[f32]; D] {
         std::array::from_fn(|c| &self.0[c][..n])
     }
 }
 
-/// Listed lines in columns.
 #[derive(Default)]
 pub(crate) struct LineColumns<const D: usize> {
     through: Columns<D>,
@@ -217,9 +214,8 @@ impl<const D: usize> LineColumns<D> {
 impl<const D: usize> Columns<D> {
     /// Computes the sections of axis candidates at these points with the line through `own` along `axis`.
     ///
-    /// A record has `D` axis lines and counts once, by the nearest of them. Its line along `axis` is parallel to the own one: within
-    /// delta it agrees with every `t`, which is evidence for the axis but not for the position. Of the other lines, the nearest
-    /// is free along the coordinate with the largest difference.
+    /// A record has `D` axis lines and counts once, by the nearest. The one along `axis` agrees, within delta, with every `t`, which is
+    /// evidence for the axis alone. Of the others, the nearest is free along the coordinate with the largest difference.
     #[inline(always)]
     pub(crate) fn sections(&self, own: &[f32; D], axis: usize, delta2: f32, out: &mut Sections) {
         let n = self.0[0].len();
@@ -250,9 +246,8 @@ impl<const D: usize> Columns<D> {
 
 /// Where listed records pass a feasible line, in columns.
 ///
-/// The squared distance from `x(t)` to record `j` is `miss2[j] + bend[j] (t - at[j])^2`: `at` is the parameter of the closest
-/// approach, `miss2` the squared distance there, and `bend` the squared sine of the angle between the lines (0 for a parallel
-/// line of an axis candidate, which agrees with every `t`). So the places within `delta` of a record form an interval of `t`.
+/// The squared distance from `x(t)` to record `j` is `miss2[j] + bend[j] (t - at[j])^2`, where `bend` is the squared sine of the angle
+/// between the lines (0 for a parallel line of an axis candidate). So the places within `delta` of a record form an interval of `t`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sections {
     pub(crate) at: Vec<f32>,
@@ -268,35 +263,30 @@ impl Sections {
     #[inline(always)]
     pub(crate) fn resize(&mut self, n: usize) {
         let padded = n.next_multiple_of(LANES);
-        self.at.resize(padded, 0.0);
-        self.miss2.resize(padded, NO_VOTE);
-        self.bend.resize(padded, 1.0);
-        self.at[n..].fill(0.0);
-        self.miss2[n..].fill(NO_VOTE);
-        self.bend[n..].fill(1.0);
+        let columns = [(&mut self.at, 0.0), (&mut self.miss2, NO_VOTE), (&mut self.bend, 1.0)];
+        for (column, padding) in columns {
+            column.truncate(n);
+            column.resize(padded, padding);
+        }
     }
 
-    /// Number of sections, with padding.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.at.len()
     }
 
-    /// Number of records that vote.
     #[inline(always)]
     pub(crate) fn n_voting(&self) -> usize {
         self.miss2.iter().map(|&miss2| usize::from(miss2 < NO_VOTE)).sum()
     }
 
-    /// Returns the squared distance from `x(t)` to record `j`.
     #[inline(always)]
     pub(crate) fn squared_distance(&self, j: usize, t: f32) -> f32 {
         let d = t - self.at[j];
         self.miss2[j] + self.bend[j] * d * d
     }
 
-    /// Returns `t` after two least-squares steps over the records within delta, and its support. The step is Eq. (4) with squared
-    /// distances: on a line, a weighted mean of the closest approaches.
+    /// Returns `t` after two least-squares steps, Eq. (4) with squared distances, over the records within delta, and its support.
     #[inline(always)]
     pub(crate) fn refit(&self, t: f32, delta2: f32) -> (f32, u32) {
         // The start of an interval is at distance delta up to rounding, and must count as within.
@@ -308,8 +298,7 @@ impl Sections {
         (t + shift, support)
     }
 
-    /// Returns the shift of `t` by one least-squares step over the records within `reach2` (squared) of `x(t)`, and their number. The shift
-    /// is 0 if all of them are parallel.
+    /// Returns the shift of `t` by one least-squares step over the records within `reach2` (squared) of `x(t)`, and their number.
     #[inline(always)]
     fn least_squares_step(&self, t: f32, reach2: f32) -> (f32, u32) {
         let (mut weight, mut sum, mut n) = ([0.0f32; LANES], [0.0f32; LANES], [0u32; LANES]);
@@ -331,7 +320,6 @@ impl Sections {
     }
 }
 
-/// The best position along a feasible line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Peak {
     pub(crate) t: f32,
@@ -346,8 +334,7 @@ pub(crate) struct Peak {
 pub(crate) struct Intervals {
     low: Vec<f32>,
     high: Vec<f32>,
-    /// For the start of each interval: the number of intervals that contain it, the chance that a random record passes there, its
-    /// cell of the grid, evidence and score.
+    /// For the start of each interval: how many intervals contain it, the chance there, its cell of the grid, evidence and score.
     count: Vec<u32>,
     chance: Vec<f32>,
     cell: Vec<u32>,
@@ -388,12 +375,10 @@ impl Intervals {
         everywhere
     }
 
-    /// Returns the position where the agreement of `sections` is least probable by chance. `limits` are the squared delta, and the range of
-    /// positions. The number of agreeing records is largest at the start of some interval, so only starts are tried.
+    /// Returns the least probable position by chance among the starts of intervals. `limits` are the squared delta and the range.
     ///
-    /// `k` listed records may vote. `chances` gets the starts, a buffer for cells, and a column to which it adds the chance that a
-    /// random record passes there. The prior is proportional to that chance, because points are denser where records are. The
-    /// lower record wins ties.
+    /// `k` listed records may vote. `chances` gets the starts, a buffer for cells, and a column to which it adds the chance that a random
+    /// record passes there. The prior is proportional to that chance. The lower record wins ties.
     #[inline(always)]
     pub(crate) fn peak(
         &mut self,
@@ -439,9 +424,8 @@ impl Intervals {
 /// Upper bound of chance: a density can give values that are no probability.
 pub(crate) const MOST_CHANCE: f32 = 0.5;
 
-/// Returns the evidence in nats that `n` of `k` listed records agree where a random one does with probability `p` (between 0 and 1,
-/// both excluded). It is 0 if `n` is at most the mean by chance. At a wrong position, `n` follows Bin(k, p); the evidence is
-/// the Chernoff bound on the tail, `k KL(n/k || p)`, which orders as the tail does.
+/// Returns the evidence in nats that `n` of `k` listed records agree where a random one does with probability `p` (in `(0, 1)`): the
+/// Chernoff bound `k KL(n/k || p)` on the tail of Bin(k, p), and 0 if `n` is at most the mean by chance.
 #[inline(always)]
 pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
     let missed = k - n;
@@ -451,8 +435,7 @@ pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
     if n <= p * k { 0.0 } else { evidence.max(0.0) }
 }
 
-/// Columns are padded to a multiple of this length with entries that do not vote. So every loop runs over whole vectors, and the
-/// order of additions is the same on every machine.
+/// Columns are padded to a multiple of this length with entries that do not vote, so that additions have one order on every machine.
 pub(crate) const LANES: usize = 8;
 
 pub(crate) type Lanes = [f32; LANES];

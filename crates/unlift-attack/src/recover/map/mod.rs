@@ -1,8 +1,7 @@
 //! The data that solvers share, made from a released map and its lists.
 //!
-//! From the bottom up: estimates per slot (`places`); a grid of cells and the density of estimates on it (`grid`); rows per record and
-//! their sections with a feasible line (`lines`); the chance that a random record passes near a place (`chance`); all of these for one map
-//! (`family`); the neighborhood graph (`graph`).
+//! From the bottom up: estimates per slot (`places`), their density on cells (`grid`), records and their sections (`lines`), the chance
+//! that a random record passes (`chance`), all of these for one map (`family`); and the neighborhood graph (`graph`).
 
 mod chance;
 mod family;

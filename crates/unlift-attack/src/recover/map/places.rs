@@ -19,7 +19,6 @@ pub(crate) fn evenly(n: usize, n_sampled: usize) -> std::iter::StepBy<Range<usiz
 
 /// A step of an attack that treats each slot on its own. Its hot loops are `#[inline(always)]` where that pays, see [`Kernel`].
 pub(crate) trait Step: Sync {
-    /// Buffers of one thread.
     type Scratch: Default;
     type Output: Send;
 
@@ -89,8 +88,7 @@ pub(crate) fn nearest2<const D: usize>(
     estimates[slots].iter().map(|e| distance2(&e.position, x)).fold(f32::INFINITY, f32::min)
 }
 
-/// Returns the corners of a slightly widened box around most places. Along each axis, 3 % at either end are left out, which may be those of
-/// wrong entries.
+/// Returns the corners of a slightly widened box around most places, without 3 % at either end of each axis, which may be wrong.
 pub(crate) fn trimmed_box<const D: usize>(places: &[[f32; D]]) -> ([f32; D], [f32; D]) {
     let Some(last) = places.len().checked_sub(1) else { return ([0.0; D], [0.0; D]) };
     let cut = (last as f64 * 0.03) as usize;
@@ -119,7 +117,6 @@ pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     sum
 }
 
-/// Returns the unit vector along an axis.
 #[inline(always)]
 pub(crate) fn unit<const D: usize>(axis: usize) -> [f32; D] {
     std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 })
@@ -128,9 +125,7 @@ pub(crate) fn unit<const D: usize>(axis: usize) -> [f32; D] {
 /// Bits per coordinate on the curve: the index on the curve and the slot share 64 bits.
 const BITS: u32 = 10;
 
-/// Returns all slots in order along a space-filling curve; slots without a place are last. Records are usually in random order, so that
-/// each access to a neighbor misses the cache on a large map. Nearby slots share neighbors, so in this order they are often cached.
-/// Results do not depend on the order.
+/// Returns all slots in order along a space-filling curve, so that neighbors are often cached; slots without a place are last.
 pub(crate) fn along_curve<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
     let (low, high) = trimmed_box(&sample(estimates));
     let cells = (1u32 << BITS) as f32;
