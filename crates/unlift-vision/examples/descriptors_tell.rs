@@ -1,8 +1,7 @@
 //! Measures inlier ratios of descriptors in photos: `descriptors_tell FOLDER [--superpoint]`.
 //!
-//! Prints the rows of a table in docs/benchmarks.md: the share of the first 20 entries of every
-//! list that are among the 20 nearest keypoints, over all photos of the folder, for each kind of
-//! features and each source.
+//! Prints the rows of a table in docs/benchmarks.md: the share of the first 20 entries of lists
+//! that are among the 20 nearest keypoints, for each kind of features and each source.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -10,8 +9,8 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::{Neighborhoods, Overlap, Similarity, Source};
-use unlift::obfuscate::obfuscate;
-use unlift::obfuscate::olc;
+use unlift::obfuscate::{obfuscate, olc};
+use unlift::protected::{inner, unit_rows};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::Original;
@@ -21,8 +20,7 @@ use unlift_vision::network::Learned;
 
 const K: usize = 20;
 
-/// Number of keypoints of a photo and, per column, the inlier ratio, if the source accepts the
-/// descriptors.
+/// Number of keypoints of a photo and, per column, the inlier ratio, if there is one.
 type Shares = (usize, [Option<f64>; COLUMNS.len()]);
 
 /// The columns: plain cosines, then the sources of unlift.
@@ -93,23 +91,13 @@ fn named(extractor: &Extractor, photo: &Path) -> Result<Option<Shares>, unlift::
 
 /// Lists the records with the largest cosines.
 fn cosines(released: &Released<2>) -> Result<Neighborhoods, unlift::Error> {
-    let n = released.n_records();
-    let Some(descriptors) = released.descriptors() else {
-        return Err(unlift::Error::new("descriptors", "some", "none"));
-    };
-    let dim = descriptors.dim();
-    let mut rows = vec![0.0f32; n * dim];
-    for (at, row) in rows.chunks_exact_mut(dim).enumerate() {
-        descriptors.read_row(at, row);
-        let norm = row.iter().map(|x| x * x).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
-        row.iter_mut().for_each(|x| *x /= norm);
-    }
-    let row = |at: usize| &rows[at * dim..(at + 1) * dim];
+    let rows: Vec<Vec<f32>> = released.descriptors().into_iter().flat_map(unit_rows).collect();
+    let n = rows.len();
     let mut records = Vec::with_capacity(n * K);
     for at in 0..n {
-        let cosine = |other: usize| row(at).iter().zip(row(other)).map(|(a, b)| a * b).sum::<f32>();
         let others = (0..n).filter(|&other| other != at);
-        let mut scored: Vec<(f32, usize)> = others.map(|other| (cosine(other), other)).collect();
+        let scored = others.map(|other| (inner(&rows[at], &rows[other]), other));
+        let mut scored: Vec<(f32, usize)> = scored.collect();
         scored.select_nth_unstable_by(K - 1, |a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         records.extend(scored[..K].iter().map(|&(_, other)| RecordId(other as u32)));
     }
