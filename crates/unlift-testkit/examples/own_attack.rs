@@ -99,8 +99,7 @@ impl Solver<3> for Median {
     }
 }
 
-/// Returns the parameter on the line through `a` of the point nearest to the line through `b`. The
-/// directions `u` and `v` have length 1.
+/// Returns where the line through `a` is nearest to that through `b`, by unit directions.
 fn nearest(a: [f32; 3], u: [f32; 3], b: [f32; 3], v: [f32; 3]) -> f32 {
     let dot = |x: [f32; 3], y: [f32; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
     let between: [f32; 3] = std::array::from_fn(|c| b[c] - a[c]);
@@ -122,14 +121,10 @@ fn main() -> Result<(), Error> {
         row_of[id.index()] = slot as u32;
     }
     let descriptors = released.descriptors().map(|descriptors| descriptors.select(&row_of));
-    let sources: [Arc<dyn Source<3>>; 2] = [Arc::new(Brightness), Arc::new(Similarity)];
+    let by = |source: Arc<dyn Source<3>>| NeighborsBy::Source(source);
     let plan = Plan {
         schemes: vec![Arc::new(olc::ENTRY)],
-        neighbors: sources
-            .map(NeighborsBy::Source)
-            .into_iter()
-            .chain([NeighborsBy::Oracle])
-            .collect(),
+        neighbors: vec![by(Arc::new(Brightness)), by(Arc::new(Similarity)), NeighborsBy::Oracle],
         solvers: vec![Arc::new(Median), Arc::new(Builtin::Joint)],
         ..Plan::new(Unit::Meter)
     };

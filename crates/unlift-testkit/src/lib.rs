@@ -1,5 +1,4 @@
-//! Property tests for schemes, sources of neighborhoods and solvers. Call them in the tests of your
-//! crate.
+//! Property tests for schemes, sources of neighborhoods and solvers of your own crate.
 //!
 //! ```
 //! use unlift::obfuscate::olc;

@@ -8,8 +8,7 @@ use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, Error, PointSet, Unit};
 
-/// Returns points of a room: walls, uneven clusters, scatter, and 3 % that coincide with another
-/// point.
+/// Returns points of a room: walls, uneven clusters, scatter, and 3 % coincident ones.
 pub fn room<const D: usize>(seed: u64, n: usize) -> Vec<[f64; D]> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 1);
     let size: [f64; D] = std::array::from_fn(|c| [6.0, 4.0, 2.5][c]);

@@ -6,12 +6,15 @@ use unlift::descriptors::Values;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
-use unlift::obfuscate::{Change, Changed, Lifted, LocalPoints, Protection, Scheme, all, olc};
+use unlift::obfuscate::{
+    Change, Changed, Entry, Lifted, LocalPoints, Protection, SCHEMES, Scheme, all, cp, olc, ppl,
+    ray,
+};
 use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
 use unlift::{Descriptors, Error};
-use unlift_testkit::{described_map, scheme_laws, solver_laws, source_laws};
+use unlift_testkit::{described_map, hide, room, scheme_laws, solver_laws, source_laws};
 
 #[test]
 fn our_schemes() {
@@ -32,7 +35,9 @@ fn our_sources() {
         let sources = SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>());
         sources.for_each(|source| source_laws(&*source, &released));
     };
-    check(described_map(&olc::ENTRY, 300));
+    [olc::ENTRY, ppl::ENTRY, ray::ENTRY, cp::ENTRY]
+        .iter()
+        .for_each(|of| check(described_map(of, 200)));
     for text in ["subspace:2:random", "subspace:4", "subspace:2:adversarial", "ldp:16,2,6"] {
         let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
         let scheme = Changed::new(Arc::new(olc::ENTRY), Change::Protection(protection));
@@ -41,13 +46,20 @@ fn our_sources() {
     }
 }
 
+fn solvers_keep_the_laws<const D: usize>(scheme: &Entry) {
+    let (original, released, secret) = hide::<D>(scheme, &room(11, 300), 1.0, 1).unwrap();
+    let near = TrueNeighbors::new(&search(&original).unwrap(), &secret, 12).unwrap();
+    let lists = near.at_inlier_ratio(0.5, 1).unwrap();
+    Builtin::ALL.iter().for_each(|solver| solver_laws(solver, &released, &lists));
+}
+
 #[test]
 fn our_solvers() {
-    let (original, released, secret) = described_map(&olc::ENTRY, 300);
-    let knn = search(&original).unwrap();
-    let lists = TrueNeighbors::new(&knn, &secret, 12).unwrap().at_inlier_ratio(0.5, 1).unwrap();
-    for solver in Builtin::ALL {
-        solver_laws::<3>(&solver, &released, &lists);
+    for entry in SCHEMES {
+        match entry.dimensions() {
+            2 => solvers_keep_the_laws::<2>(entry),
+            _ => solvers_keep_the_laws::<3>(entry),
+        }
     }
 }
 

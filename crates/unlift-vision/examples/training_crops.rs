@@ -134,8 +134,7 @@ fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
     crops
 }
 
-/// Returns the `n` keypoints nearest `place`, by the larger of the distances along the axes,
-/// with y multiplied by `stretch`.
+/// Returns the `n` keypoints nearest `place` in the larger of x and y times `stretch`.
 fn nearest(features: &Features, place: [f32; 2], stretch: f32, n: usize) -> Vec<u32> {
     let distance = |row: &u32| {
         let [x, y] = features.places[*row as usize];

@@ -12,8 +12,7 @@ pub mod pictures;
 use std::path::Path;
 use std::{fs, io};
 
-/// Reads all bytes of a file. Pipes, sockets and devices are refused, because reading them may never
-/// end; of a folder, the system returns an error.
+/// Reads all bytes of a file. Pipes, sockets and devices are refused: reading them may never end.
 fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     let metadata = fs::metadata(path)?;
     if !metadata.is_file() && !metadata.is_dir() {

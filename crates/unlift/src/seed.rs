@@ -20,8 +20,7 @@ use crate::Error;
 
 pub use unlift_attack::seed::*;
 
-/// A 256-bit key for all random numbers that hide a map. It is part of the secret and is not
-/// printed.
+/// A 256-bit key for all random numbers that hide a map. It is secret and not printed.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Key([u8; 32]);
 
@@ -49,14 +48,12 @@ impl Key {
         Self(key)
     }
 
-    /// Returns the key of one `item` of `stage`, such as one image. It reveals neither this key nor
-    /// that of another item.
+    /// Returns the key of one `item` of `stage`, such as one image. It reveals no other key.
     pub fn of_item(&self, stage: Stage, item: u64) -> Self {
         Self(first_bytes(&self.stage(stage).0, item))
     }
 
-    /// Returns the random stream of `item` in `stage`. For many items of a stage,
-    /// [`stage`](Self::stage) is faster.
+    /// Returns the random stream of `item` in `stage`; [`stage`](Self::stage) is faster for many.
     pub fn draws(&self, stage: Stage, item: u64) -> Draws<Cipher> {
         self.stage(stage).draws(item)
     }

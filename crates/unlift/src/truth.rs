@@ -1,5 +1,4 @@
-//! Ground truth: originals and secrets, for the owner only. The attacker's crate, `unlift-attack`,
-//! does not depend on this one.
+//! Ground truth: originals and secrets, for the owner only.
 
 use crate::geometry::frame::Bounds;
 use crate::{Error, Fingerprint, PointSet};
@@ -47,8 +46,7 @@ impl<const D: usize> Original<D> {
         Self { points, bounds: None }
     }
 
-    /// Creates ground truth from the keypoints of an image of known size. All `points` must lie
-    /// within `bounds`, which are not secret.
+    /// Creates ground truth from keypoints within the `bounds` of an image, which are not secret.
     ///
     /// # Errors
     /// When a point lies outside `bounds`.
@@ -82,44 +80,22 @@ impl<const D: usize> Original<D> {
     }
 }
 
-/// Reason why a scheme left a point out of the released map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum DropReason {
-    /// One point remains in a pairing of an odd number.
-    OddPoint,
-    /// All possible partners lie at the same place, so no line is defined.
-    CoincidentPair,
-    /// Its line stayed within the local surface in all re-pairings (`ppl+`).
-    RejectedPair,
-    /// It lies on the center of a ray cloud or the anchor of an image, so its ray has no direction.
-    OnCenter,
-    /// A mitigation kept only a part of the points.
-    Thinned,
-    /// A custom scheme left it out.
-    Other,
-}
-
-impl DropReason {
-    /// All reasons.
-    pub const ALL: [DropReason; 6] = [
-        Self::OddPoint,
-        Self::CoincidentPair,
-        Self::RejectedPair,
-        Self::OnCenter,
-        Self::Thinned,
-        Self::Other,
-    ];
-
-    /// Returns the name used in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OddPoint => "odd_point",
-            Self::CoincidentPair => "coincident_pair",
-            Self::RejectedPair => "rejected_pair",
-            Self::OnCenter => "on_center",
-            Self::Thinned => "thinned",
-            Self::Other => "other",
-        }
+unlift_attack::named! {
+    /// Reason why a scheme left a point out of the released map.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum DropReason {
+        /// One point remains in a pairing of an odd number.
+        OddPoint = "odd_point",
+        /// All possible partners lie at the same place, so no line is defined.
+        CoincidentPair = "coincident_pair",
+        /// Its line stayed within the local surface in all re-pairings (`ppl+`).
+        RejectedPair = "rejected_pair",
+        /// It lies on the center of a ray cloud or the anchor of an image, so its ray has no direction.
+        OnCenter = "on_center",
+        /// A mitigation kept only a part of the points.
+        Thinned = "thinned",
+        /// A custom scheme left it out.
+        Other = "other",
     }
 }
 
@@ -162,16 +138,8 @@ impl Secret {
         slots_per_record: usize,
     ) -> Result<Self, Error> {
         let n = hidden.len();
-        let n_axes = swapped_axis.as_ref().map_or(n, Vec::len);
-        for (what, rows) in [("swapped axes", n_axes), ("descriptor rows", descriptor_row.len())] {
-            if rows != n {
-                return Err(Error::new(what, format!("{n} rows"), rows.to_string()));
-            }
-        }
-        if let Some(slot) = descriptor_row.iter().position(|&row| row as usize >= n) {
-            let what = format!("descriptor row of slot {slot}");
-            return Err(Error::new(what, format!("below {n}"), descriptor_row[slot].to_string()));
-        }
+        Error::check_len("swapped axes", swapped_axis.as_ref().map_or(n, Vec::len), n, " rows")?;
+        Error::check_len("descriptor rows", descriptor_row.len(), n, " rows")?;
         let not_once = |id: usize, found: &str| {
             Error::new(format!("original {id}"), "in one slot or dropped once", found)
         };
@@ -182,7 +150,7 @@ impl Secret {
                 Some(_) => return Err(not_once(id.index(), "two entries")),
                 None => {
                     let expected = format!("originals below {n_originals}");
-                    return Err(Error::new("hidden originals", expected, id.0.to_string()));
+                    return Err(Error::new("hidden originals", expected, id.0));
                 }
             }
         }
@@ -191,7 +159,7 @@ impl Secret {
         }
         if slots_per_record == 0 || !n.is_multiple_of(slots_per_record) {
             let expected = format!("a number that divides {n} slots");
-            return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
+            return Err(Error::new("slots per record", expected, slots_per_record));
         }
         // A wrong or repeated row would join positions with unrelated points.
         for (record, rows) in descriptor_row.chunks(slots_per_record).enumerate() {
@@ -200,7 +168,7 @@ impl Secret {
             if let Some(at) = (0..rows.len()).find(wrong) {
                 let what = format!("descriptor row of slot {}", record * slots_per_record + at);
                 let expected = format!("a row of record {record}, each once");
-                return Err(Error::new(what, expected, rows[at].to_string()));
+                return Err(Error::new(what, expected, rows[at]));
             }
         }
         Ok(Self {
@@ -255,8 +223,7 @@ impl Secret {
         &self.descriptor_row
     }
 
-    /// Returns the secret with slots in the order of descriptor rows: slot `s` hides the point of
-    /// descriptor row `s`. Lists made from descriptors have this order.
+    /// Returns the secret with slots in the order of descriptor rows, as of lists from descriptors.
     #[must_use]
     pub fn by_descriptor_row(&self) -> Self {
         let mut by_row = self.clone();
@@ -271,8 +238,7 @@ impl Secret {
         by_row
     }
 
-    /// Returns the secret with the two points of a record exchanged if `exchange` returns true for
-    /// the record's first slot.
+    /// Returns the secret with the points of records exchanged whose first slot `exchange` accepts.
     #[must_use]
     pub fn exchanged(&self, exchange: impl Fn(usize) -> bool) -> Self {
         let mut exchanged = self.clone();

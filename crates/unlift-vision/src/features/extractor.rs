@@ -116,8 +116,8 @@ impl Extractor {
         let (width, height) = (photo.width(), photo.height());
         if width.min(height) < LEAST_SIDE {
             let expected = format!("at least {LEAST_SIDE} pixels a side");
-            let found = format!("{width} x {height}");
-            return Err(Error::new(path.display().to_string(), expected, found));
+            let place = path.display().to_string();
+            return Err(Error::new(place, expected, format!("{width} x {height}")));
         }
         let size = [width as usize, height as usize];
         let shrunk = f64::from(width.max(height)) / self.options.max_image_size as f64;
@@ -140,8 +140,7 @@ const PER_THREAD: usize = 8;
 
 /// Calls `work` on all items in parallel, and `sink` on the results, one at a time and in order.
 ///
-/// At most 8 items per thread are in memory at once. Runs on rayon's current pool. Ends with the
-/// first error of `sink`.
+/// At most 8 items per thread are in memory. Ends with the first error of `sink`.
 ///
 /// # Errors
 /// When `sink` returns an error.

@@ -11,8 +11,7 @@ pub use image::RgbImage as ColorImage;
 
 /// A gray image.
 ///
-/// `pixels` is `(height, width)`, row-major; 0 is black, 1 is white. Thresholds of the extractor
-/// use this scale.
+/// `pixels` is `(height, width)`, row-major; 0 is black, 1 is white.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrayImage {
     width: usize,
@@ -27,8 +26,7 @@ impl GrayImage {
     /// If a side is zero, the length of `pixels` is not `width * height`, or a value is not finite.
     pub fn try_new(width: usize, height: usize, pixels: Vec<f32>) -> Result<Self, Error> {
         if width == 0 || height == 0 {
-            let found = format!("{width} x {height}");
-            return Err(Error::new("image", "at least one pixel", found));
+            return Err(Error::new("image", "at least one pixel", format!("{width} x {height}")));
         }
         if width.checked_mul(height) != Some(pixels.len()) {
             let expected = format!("{width} x {height} pixels");
@@ -36,7 +34,7 @@ impl GrayImage {
         }
         if let Some(at) = pixels.iter().position(|value| !value.is_finite()) {
             let what = format!("image: pixel ({}, {})", at % width, at / width);
-            return Err(Error::new(what, "a finite value", pixels[at].to_string()));
+            return Err(Error::new(what, "a finite value", pixels[at]));
         }
         Ok(Self { width, height, pixels })
     }
@@ -94,8 +92,7 @@ where
     Some(resize(image, side(image.width()), side(image.height()), FilterType::Lanczos3))
 }
 
-/// Converts the position `place` in `small`, which is `image` downsized, to pixels of `image`.
-/// Pixel centers have integer coordinates.
+/// Converts a position in `small`, which is `image` downsized, to pixels of `image`.
 pub(crate) fn unshrunk(image: &ColorImage, small: &ColorImage, [x, y]: [f32; 2]) -> [f32; 2] {
     let full = |at: f32, large: u32, small: u32| match large == small {
         true => at,

@@ -8,9 +8,8 @@ use unlift::neighbors::DescriptorKind;
 pub struct Extraction {
     /// The kind of the features.
     pub kind: DescriptorKind,
-    /// Number of requested features. Networks return the best ones, at most this number. SIFT
-    /// returns whole levels, from the coarsest to the one that exceeds this number, so it may
-    /// return more.
+    /// Number of requested features. Networks return the best ones, at most this number; SIFT whole
+    /// levels, from the coarsest to the one that exceeds it.
     pub max_features: usize,
     /// Score that a keypoint of a network must exceed, 0 to 1. Keypoints of SIFT have none.
     pub min_score: f32,
@@ -54,10 +53,10 @@ impl Extraction {
             return Err(Error::new("max_features", "at least 1", "0"));
         }
         if !(0.0..1.0).contains(&min_score) {
-            return Err(Error::new("min_score", "0 to below 1", min_score.to_string()));
+            return Err(Error::new("min_score", "0 to below 1", min_score));
         }
         if !(1..=1 << 16).contains(&max_image_size) {
-            return Err(Error::new("max_image_size", "1 to 65536", max_image_size.to_string()));
+            return Err(Error::new("max_image_size", "1 to 65536", max_image_size));
         }
         Ok(())
     }

@@ -14,14 +14,12 @@ use crate::read_regular;
 
 /// The readable formats, for errors.
 const KINDS: &str = "a JPEG, PNG or WebP image";
-/// Maximum number of pixels of a photo: 16384 x 16384. A header can declare any size in a few
-/// bytes.
+/// Maximum number of pixels of a photo: 16384 x 16384. A header can declare any size.
 const MAX_PIXELS: u64 = 1 << 28;
 /// Maximum number of pixels per byte of a JPEG: every block of 8 x 8 pixels takes a bit. A file
 /// beyond it is truncated or of one color, but decoders fill in missing blocks.
 const JPEG_PIXELS_PER_BYTE: u64 = 512;
-/// Maximum number of pixels per byte of other formats: PNG compresses by at most 1032. WebP has no
-/// bound, but photos need a hundred times as many bytes.
+/// Maximum number of pixels per byte of other formats: PNG compresses by at most 1032.
 const OTHER_PIXELS_PER_BYTE: u64 = 1032;
 /// Number of pixels allowed for any file size, 4096 x 4096: black frames exist.
 const FREE_PIXELS: u64 = 1 << 24;
@@ -60,7 +58,7 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
 
 pub(crate) fn open(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
     let name = path.display().to_string();
-    let bytes = read_regular(path).map_err(|error| Error::new(&*name, KINDS, error.to_string()))?;
+    let bytes = read_regular(path).map_err(|error| Error::new(&*name, KINDS, error))?;
     decoded(&bytes, &name, turn)
 }
 
@@ -75,10 +73,13 @@ fn decoded(bytes: &[u8], name: &str, turn: Turn) -> Result<DynamicImage, Error> 
         return Err(wrong(&whole, "one that is cut off".to_owned()));
     }
     let broken = |error: ImageError| wrong(&whole, error.to_string());
-    let max_pixels = max_pixels(format, bytes.len() as u64);
+    let per_byte = match format {
+        ImageFormat::Jpeg => JPEG_PIXELS_PER_BYTE,
+        _ => OTHER_PIXELS_PER_BYTE,
+    };
+    let max_pixels = (bytes.len() as u64).saturating_mul(per_byte).clamp(FREE_PIXELS, MAX_PIXELS);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    // Limits memory by the size in a PNG's header, because a color profile can inflate a thousand
-    // times.
+    // The size in a PNG's header limits memory: color profiles can inflate a thousand times.
     let side = |at: usize| Some(u64::from(u32::from_be_bytes(*bytes.get(at..)?.first_chunk()?)));
     let declared = match (format, side(16), side(20)) {
         (ImageFormat::Png, Some(width), Some(height)) => width.saturating_mul(height),
@@ -105,17 +106,7 @@ fn decoded(bytes: &[u8], name: &str, turn: Turn) -> Result<DynamicImage, Error> 
     Ok(photo)
 }
 
-/// Returns the maximum number of pixels of a photo of `n_bytes` bytes.
-fn max_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
-    let per_byte = match format {
-        ImageFormat::Jpeg => JPEG_PIXELS_PER_BYTE,
-        _ => OTHER_PIXELS_PER_BYTE,
-    };
-    n_bytes.saturating_mul(per_byte).clamp(FREE_PIXELS, MAX_PIXELS)
-}
-
-/// Converts to gray values as COLMAP does: rounded to bytes, weights of Rec. 709, transparency
-/// ignored.
+/// Converts to gray bytes as COLMAP does: weights of Rec. 709, transparency ignored.
 pub(crate) fn gray(photo: DynamicImage) -> Result<GrayImage, Error> {
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     if !photo.color().has_color() {
@@ -158,8 +149,7 @@ fn label(format: ImageFormat) -> String {
     }
 }
 
-/// Returns true if a JPEG has an end marker after its first scan. Decoders fill missing parts with
-/// gray. The end marker of a thumbnail in the header does not count.
+/// Returns true if a JPEG has an end marker after its first scan: decoders fill gaps with gray.
 fn has_end(bytes: &[u8]) -> bool {
     const SCAN: u8 = 0xda;
     let mut at = 2;
@@ -179,18 +169,16 @@ fn has_end(bytes: &[u8]) -> bool {
 /// JPEG quality, of 100: recognizable, and small enough to embed.
 const QUALITY: u8 = 72;
 
-/// Encodes the photo at `path` as a color JPEG, downsized so that no side exceeds `longest` pixels,
-/// without metadata.
+/// Encodes a photo as a color JPEG without metadata, whose sides are at most `longest` pixels.
 pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
     let photo = open(path, turn)?;
     let photo = match photo.width().max(photo.height()) > longest {
         true => photo.resize(longest, longest, FilterType::Triangle),
         false => photo,
     };
-    encoded(&photo.into_rgb8()).map_err(|error| {
-        let name = path.display().to_string();
-        Error::new(name, "a photo that can be downsized", error.to_string())
-    })
+    let wrong =
+        |error| Error::new(path.display().to_string(), "a photo that can be downsized", error);
+    encoded(&photo.into_rgb8()).map_err(wrong)
 }
 
 /// Encodes an image as JPEG, downsized so that no side exceeds `longest` pixels.
@@ -199,7 +187,7 @@ pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
 /// If a side still has more than 65,535 pixels.
 pub fn jpeg_of(image: &ColorImage, longest: usize) -> Result<Vec<u8>, Error> {
     encoded(fitted(image, longest).as_ref().unwrap_or(image))
-        .map_err(|error| Error::new("picture", "at most 65535 pixels a side", error.to_string()))
+        .map_err(|error| Error::new("picture", "at most 65535 pixels a side", error))
 }
 
 fn encoded(image: &ColorImage) -> Result<Vec<u8>, ImageError> {
@@ -211,8 +199,7 @@ fn encoded(image: &ColorImage) -> Result<Vec<u8>, ImageError> {
 /// Encodes an image as PNG.
 pub fn png_of(image: &ColorImage) -> Result<Vec<u8>, Error> {
     let mut bytes = Cursor::new(Vec::new());
-    image
-        .write_to(&mut bytes, ImageFormat::Png)
-        .map_err(|error| Error::new("picture", "one that fits a PNG", error.to_string()))?;
+    let written = image.write_to(&mut bytes, ImageFormat::Png);
+    written.map_err(|error| Error::new("picture", "one that fits a PNG", error))?;
     Ok(bytes.into_inner())
 }

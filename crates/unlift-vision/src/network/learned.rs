@@ -29,14 +29,12 @@ pub const SOURCES: &[SourceEntry] = &[SourceEntry {
 /// The descriptors choose the network: SIFT, 128 floats that are not SIFT (taken for ALIKED), or
 /// 256 floats (SuperPoint, whose network users train themselves).
 ///
-/// Source: Sec. 5 and supplement D, where positions are not known either; pair scores, the loss and
-/// the walk are ours.
+/// Source: Sec. 5 and supplement D; pair scores, the loss and the walk are ours.
 #[derive(Clone, Copy, Debug)]
 pub struct Learned;
 
-/// Weight of a standard deviation of learned descriptors' cosines beside the network's scores. The
-/// network finds the nearest twenty but does not order them; similarity does
-/// (docs/decisions/sources.md).
+/// Weight of cosines of learned descriptors beside the network's scores, which find the nearest
+/// twenty but do not order them (docs/decisions/sources.md).
 const LIKENESS: f32 = 0.2;
 
 fn network(descriptors: &Descriptors) -> Result<&'static Network, Error> {

@@ -96,12 +96,10 @@ impl fmt::Debug for Network {
 }
 
 impl Network {
-    /// Loads the model `name` of [`MODELS`] from the place where
-    /// [`Folders::of_process`] finds it.
+    /// Loads the model `name` of [`MODELS`] from the [`Folders::of_process`].
     ///
     /// # Errors
-    /// If there is no such name, the model is missing, its hash differs, it is not ONNX, or it has
-    /// other inputs and outputs.
+    /// If there is no such model, its hash differs, it is not ONNX, or has other inputs or outputs.
     pub fn load(name: &str) -> Result<Self, Error> {
         Self::load_from(&Folders::of_process(), entry(name)?)
     }
@@ -118,9 +116,8 @@ impl Network {
     /// Loads the model in the file `path`, as `entry` describes it.
     pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
         let place = path.display().to_string();
-        let bytes = read_regular(path)
-            .map_err(|error| Error::new(place.clone(), "a model in ONNX", error.to_string()))?;
-        Self::from_bytes(Cow::Owned(bytes), &place, entry)
+        let wrong = |error| Error::new(&*place, "a model in ONNX", error);
+        Self::from_bytes(Cow::Owned(read_regular(path).map_err(wrong)?), &place, entry)
     }
 
     fn from_bytes(bytes: Cow<'static, [u8]>, place: &str, entry: &Entry) -> Result<Self, Error> {
@@ -139,9 +136,9 @@ impl Network {
                 Cow::Owned(bytes) => options.load(bytes),
             }
         });
-        let refused = |found: &str| Error::new(place, "a model in ONNX", one_line(found));
-        let model = model.map_err(|panic| refused(&panic))?;
-        let model = model.map_err(|error| refused(&error.to_string()))?;
+        let model = model.and_then(|model| model.map_err(|error| error.to_string()));
+        let refused = |found: String| Error::new(place, "a model in ONNX", one_line(&found));
+        let model = model.map_err(refused)?;
         let network = Self {
             place: place.to_owned(),
             sha256,
@@ -161,13 +158,11 @@ impl Network {
 
     /// Runs the part of the network from `inputs` to `outputs`, given by name, on one thread.
     ///
-    /// Callers process several pictures or maps in parallel, so results do not depend on the number
-    /// of threads. They may differ in the last bits between machines with other vector
-    /// instructions.
+    /// Callers process several pictures or maps in parallel. Results may differ in the last bits
+    /// between machines with other vector instructions.
     ///
     /// # Errors
-    /// If the network has no such name, a shape does not fit, or an output is not an array of
-    /// floats.
+    /// If a name is unknown, a shape does not fit, or an output is not an array of floats.
     pub fn run<const N: usize>(
         &self,
         inputs: Vec<(&str, Tensor)>,
@@ -202,9 +197,8 @@ impl Network {
             Tensor::try_new(&shape, tensor.into_data())
         });
         let tensors = tensors.collect::<Result<Vec<_>, _>>()?;
-        let fewer =
-            |tensors: Vec<Tensor>| wrong(&format!("{N} outputs"), &tensors.len().to_string());
-        tensors.try_into().map_err(fewer)
+        let n = tensors.len().to_string();
+        tensors.try_into().map_err(|_| wrong(&format!("{N} outputs"), &n))
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Arc<ThreadPool>>> {
@@ -215,14 +209,13 @@ impl Network {
     /// Checks that the file has these inputs or outputs, with these shapes.
     fn check(&self, ports: &[Port], ids: &[NodeId], kind: &str) -> Result<(), Error> {
         for port in ports {
-            let info = ids.iter().filter_map(|&id| self.model.node_info(id));
-            let info = info.into_iter().find(|info| info.name() == Some(port.name));
+            let infos = || ids.iter().filter_map(|&id| self.model.node_info(id));
             let wrong = |found: String| {
                 Error::new(&*self.place, format!("an {kind} {port}"), one_line(&found))
             };
-            let Some(info) = info else {
-                let names = ids.iter().filter_map(|&id| self.model.node_info(id)?.name());
-                let names: Vec<&str> = names.collect();
+            let Some(info) = infos().find(|info| info.name() == Some(port.name)) else {
+                let names: Vec<String> =
+                    infos().filter_map(|info| info.name().map(str::to_owned)).collect();
                 return Err(wrong(format!("{kind}s {}", names.join(", "))));
             };
             // Exporters may omit shapes of outputs; `run` checks the actual ones.

@@ -1,5 +1,4 @@
-//! The registry of models, and the places of their files: in the user's folders, or embedded in the
-//! program.
+//! The registry of models, and where their files are: in the user's folders, or embedded.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -17,8 +16,7 @@ pub struct Entry {
     pub licence: &'static str,
     /// The page or file that publishes it.
     pub owner: &'static str,
-    /// SHA-256 of the file, in hexadecimal; `None` if users make the file themselves, so that its
-    /// bytes vary.
+    /// SHA-256 of the file, in hexadecimal; `None` if users make the file themselves.
     pub sha256: Option<&'static str>,
     /// The inputs, in the order of the file.
     pub inputs: &'static [Port],
@@ -71,8 +69,7 @@ const PICTURE: &[Port] = &[Port { name: "picture", shape: &[Some(1), Some(3), No
 /// The output of networks that score pairs of descriptors.
 const SCORES: &[Port] = &[Port { name: "scores", shape: &[None, None] }];
 
-/// All models, by name. A `static`, because a `const` would copy the bytes of all embedded files to
-/// each use.
+/// All models, by name. A `const` would copy all embedded files to each use.
 pub static MODELS: &[Entry] = &[
     Entry {
         name: "aliked-n16rot",
@@ -188,8 +185,7 @@ pub static MODELS: &[Entry] = &[
                   training/export/superpoint.py",
         licence: "non-commercial research only, no redistribution",
         owner: "https://github.com/magicleap/SuperPointPretrainedNetwork",
-        // The bytes depend on the exporter's version; the script checks the hash of the published
-        // weights.
+        // The bytes depend on the exporter's version; the script checks the published weights.
         sha256: None,
         inputs: &[Port { name: "image", shape: &[Some(1), Some(1), None, None] }],
         outputs: &[
@@ -244,7 +240,7 @@ impl Folders {
         if let Some(given) = &self.given
             && !given.is_dir()
         {
-            return Err(Error::new(VARIABLE, "a folder", given.display().to_string()));
+            return Err(Error::new(VARIABLE, "a folder", given.display()));
         }
         let folders = [&self.given, &self.user].into_iter().flatten();
         Ok(folders.map(|folder| folder.join(entry.file())).find(|path| path.is_file()))
@@ -254,12 +250,11 @@ impl Folders {
     pub fn missing(&self, entry: &Entry) -> Error {
         let folders = [&self.given, &self.user].into_iter().flatten();
         let folders: Vec<String> = folders.map(|folder| folder.display().to_string()).collect();
-        let expected = match folders.as_slice() {
-            [] => format!("in the folder that {VARIABLE} names"),
-            folders => format!("in {}", folders.join(" or ")),
+        let place = match folders.as_slice() {
+            [] => format!("the folder that {VARIABLE} names"),
+            folders => folders.join(" or "),
         };
-        let expected = format!("{expected} ({})", entry.owner);
-        Error::new(entry.file(), expected, "nothing")
+        Error::new(entry.file(), format!("in {place} ({})", entry.owner), "nothing")
     }
 }
 

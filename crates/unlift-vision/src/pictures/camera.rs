@@ -17,11 +17,9 @@ const TRIED: usize = 6000;
 enum Kind {
     /// Perspective, radial distortion `(1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6)`.
     Perspective { k: [f64; 6], p: [f64; 2] },
-    /// Fisheye: the angle from the axis, times `1 + k1 a2 + k2 a4 ..`.
-    Fisheye { k: [f64; 6] },
     /// THIN_PRISM_FISHEYE: the angle with radial, tangential and thin-prism terms, added.
     ThinPrism { k: [f64; 6], p: [f64; 2], s: [f64; 2] },
-    /// RAD_TAN_THIN_PRISM_FISHEYE.
+    /// Fisheye: the angle from the axis, times `1 + k1 a2 + k2 a4 ..`, and the other terms of RAD_TAN_THIN_PRISM_FISHEYE.
     RadTan { k: [f64; 6], p: [f64; 2], s: [f64; 4] },
     /// FOV: one parameter, an angle.
     Fov(f64),
@@ -40,14 +38,13 @@ impl Kind {
             Self::Perspective { .. } | Self::Fov(_) | Self::Division(_) => FRAC_PI_2,
             _ => PI,
         };
+        let angle = |at: usize| all * at as f64 / TRIED as f64;
         let mut last = 0.0;
         for at in 1..TRIED {
-            let angle = all * at as f64 / TRIED as f64;
-            let place = match self.radial(angle) {
-                Some(place) if place > last => place,
-                _ => return all * (at - 1) as f64 / TRIED as f64,
-            };
-            last = place;
+            match self.radial(angle(at)) {
+                Some(place) if place > last => last = place,
+                _ => return angle(at - 1),
+            }
         }
         all
     }
@@ -56,14 +53,14 @@ impl Kind {
     fn radial(&self, angle: f64) -> Option<f64> {
         Some(match self {
             Self::Perspective { k, .. } => {
-                let r2 = libm::tan(angle) * libm::tan(angle);
-                let below = polynomial(&k[3..], r2);
+                let flat = libm::tan(angle);
+                let (r2, below) = (flat * flat, polynomial(&k[3..], flat * flat));
                 if below <= 0.0 {
                     return None;
                 }
-                libm::tan(angle) * polynomial(&k[..3], r2) / below
+                flat * polynomial(&k[..3], r2) / below
             }
-            Self::Fisheye { k } | Self::RadTan { k, .. } | Self::ThinPrism { k, .. } => {
+            Self::RadTan { k, .. } | Self::ThinPrism { k, .. } => {
                 angle * polynomial(k, angle * angle)
             }
             // These have no polynomial; `bent` detects their limits.
@@ -89,7 +86,7 @@ impl Lens {
     /// If the model is unknown or has another number of parameters, or one is not finite.
     pub fn try_new(model: &str, params: &[f64]) -> Result<Self, Error> {
         if let Some(bad) = params.iter().find(|x| !x.is_finite()) {
-            return Err(Error::new(model, "finite parameters", bad.to_string()));
+            return Err(Error::new(model, "finite parameters", bad));
         }
         // Focal lengths (one or two), the center, then the distortion.
         let n_focal =
@@ -99,20 +96,22 @@ impl Lens {
         let d = |at: usize| f(n_before + at);
         // The first `n` are radial, the others zero.
         let k = |n: usize| std::array::from_fn(|at| if at < n { d(at) } else { 0.0 });
+        let radial = |n: usize| Kind::Perspective { k: k(n), p: [0.0; 2] };
+        let fisheye = |n: usize| Kind::RadTan { k: k(n), p: [0.0; 2], s: [0.0; 4] };
         // Number of parameters of the distortion, and the distortion.
         let (n, kind) = match model {
-            "SIMPLE_PINHOLE" | "PINHOLE" => (0, Kind::Perspective { k: k(0), p: [0.0; 2] }),
-            "SIMPLE_RADIAL" => (1, Kind::Perspective { k: k(1), p: [0.0; 2] }),
-            "RADIAL" => (2, Kind::Perspective { k: k(2), p: [0.0; 2] }),
+            "SIMPLE_PINHOLE" | "PINHOLE" => (0, radial(0)),
+            "SIMPLE_RADIAL" => (1, radial(1)),
+            "RADIAL" => (2, radial(2)),
             "OPENCV" => (4, Kind::Perspective { k: k(2), p: [d(2), d(3)] }),
             "FULL_OPENCV" => {
                 let k = [d(0), d(1), d(4), d(5), d(6), d(7)];
                 (8, Kind::Perspective { k, p: [d(2), d(3)] })
             }
-            "SIMPLE_FISHEYE" | "FISHEYE" => (0, Kind::Fisheye { k: k(0) }),
-            "SIMPLE_RADIAL_FISHEYE" => (1, Kind::Fisheye { k: k(1) }),
-            "RADIAL_FISHEYE" => (2, Kind::Fisheye { k: k(2) }),
-            "OPENCV_FISHEYE" => (4, Kind::Fisheye { k: k(4) }),
+            "SIMPLE_FISHEYE" | "FISHEYE" => (0, fisheye(0)),
+            "SIMPLE_RADIAL_FISHEYE" => (1, fisheye(1)),
+            "RADIAL_FISHEYE" => (2, fisheye(2)),
+            "OPENCV_FISHEYE" => (4, fisheye(4)),
             "THIN_PRISM_FISHEYE" => {
                 let k = [d(0), d(1), d(4), d(5), 0.0, 0.0];
                 (8, Kind::ThinPrism { k, p: [d(2), d(3)], s: [d(6), d(7)] })
@@ -130,10 +129,7 @@ impl Lens {
                 return Err(Error::new("camera model", "one of COLMAP's", name));
             }
         };
-        if params.len() != n_before + n {
-            let expected = format!("{} parameters", n_before + n);
-            return Err(Error::new(model, expected, params.len().to_string()));
-        }
+        Error::check_len(model, params.len(), n_before + n, " parameters")?;
         let (focal, center) = match kind {
             // Its parameters are the size of the image.
             Kind::Equirectangular => ([f(0) / TAU, f(1) / PI], [f(0) / 2.0, f(1) / 2.0]),
@@ -209,7 +205,6 @@ impl Lens {
                 let moved = tangential(flat, r2, *p);
                 [0, 1].map(|c| flat[c] * above / below + moved[c])
             }
-            Kind::Fisheye { k } => angular.map(|x| x * polynomial(k, angle * angle)),
             Kind::ThinPrism { k, p, s } => {
                 let r2 = squared(angular);
                 let moved = tangential(angular, r2, *p);
@@ -290,17 +285,12 @@ const BEHIND: f32 = 1.15;
 const ENOUGH: usize = 3;
 
 impl View {
-    /// Projects points into the image, hidden or not. Skips positions that are `None` or not
-    /// finite.
+    /// Projects points into the image, hidden or not. Skips positions that are `None` or not finite.
     ///
     /// # Errors
-    /// If there are more points than 32 bits can count, or the image is too large for a feature
-    /// image.
+    /// If the image is too large for a feature image.
     pub fn project(&self, points: &[Option<[f64; 3]>]) -> Result<Projection, Error> {
         check_size(self.size)?;
-        u32::try_from(points.len()).map_err(|_| {
-            Error::new("points", "at most 4294967295 of them", points.len().to_string())
-        })?;
         let mut projection = Projection::default();
         for (at, point) in points.iter().enumerate() {
             let Some(point) = point else { continue };
@@ -329,12 +319,10 @@ impl Projection {
     }
 
     /// Returns which points are visible. A point is hidden if at least three points in the window
-    /// around it, 16 pixels wide, are clearly nearer. Where points are sparse, some hidden ones
-    /// pass.
+    /// around it are clearly nearer. Where points are sparse, some hidden ones pass.
     pub fn visible(&self, size: [usize; 2]) -> Vec<bool> {
         let [width, height] = size.map(|side| side.div_ceil(WINDOW / 2));
-        // Windows overlap by half: cells have half the side, and each point checks the four nearest
-        // cells.
+        // Cells have half the side of a window, and each point checks the four nearest.
         let cell = |place: [f32; 2]| place.map(|x| (x + 0.5).max(0.0) / (WINDOW / 2) as f32);
         let mut depths: Vec<Vec<f32>> = vec![Vec::new(); width * height];
         for (place, depth) in self.places.iter().zip(&self.depths) {

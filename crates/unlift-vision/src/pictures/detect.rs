@@ -39,8 +39,7 @@ pub struct Detection {
     pub class: usize,
     /// Confidence of the detector, 0 to 1.
     pub score: f32,
-    /// Left, top, right and bottom in pixels, the corner of the picture at (0, 0); may exceed the
-    /// picture.
+    /// Left, top, right and bottom in pixels from the corner; may exceed the picture.
     pub sides: [f32; 4],
 }
 

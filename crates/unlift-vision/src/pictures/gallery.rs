@@ -34,8 +34,7 @@ impl Gallery {
         (self.photos.len() > 1).then(|| 1.0 / self.photos.len() as f64)
     }
 
-    /// Returns whether `picture` has a smaller LPIPS distance to its own photo than to every other photo. `None` if the gallery lacks the
-    /// photo `name`, or other photos.
+    /// Returns whether the photo `name` is nearer by LPIPS than every other; `None` if the gallery lacks it, or others.
     ///
     /// # Errors
     /// If the network fails.

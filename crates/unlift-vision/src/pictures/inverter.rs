@@ -10,8 +10,7 @@ use crate::network::{DescriptorKind, Entry, Network, Tensor, entry};
 
 /// Side of a cell in pixels.
 pub const CELL: usize = 4;
-/// Channels after those of the descriptor and the color: the position inside the cell (two), and
-/// the weight.
+/// Channels after descriptor and color: the position inside the cell (two), and the weight.
 const PLACE: usize = 3;
 /// Channels of the color: red, green, blue, and whether it is known.
 const COLOR: usize = 4;
@@ -35,9 +34,7 @@ impl Points<'_> {
         let depths = self.depths.map_or(n, <[f32]>::len);
         let lengths = [self.descriptors.len(), self.weights.len(), depths];
         for (what, rows) in ["descriptors", "weights", "depths"].into_iter().zip(lengths) {
-            if rows != n {
-                return Err(Error::new(what, format!("{n}, one per point"), rows.to_string()));
-            }
+            Error::check_len(what, rows, n, ", one per point")?;
         }
         Ok(())
     }
@@ -49,13 +46,11 @@ impl Points<'_> {
         let place = self.places[at].map(|x| x + 0.5);
         let inside = (0..2).all(|c| place[c] >= 0.0 && place[c] < size[c] as f32);
         // NaN fails every comparison.
-        let trusted = self.weights[at] > 0.0;
-        if !inside || !trusted {
-            return None;
-        }
+        let is_trusted = self.weights[at] > 0.0;
         let place = place.map(|x| x / CELL as f32);
         let cell = place.map(|x| x as usize);
-        Some((cell, [0, 1].map(|c| 2.0 * (place[c] - cell[c] as f32) - 1.0)))
+        let within = [0, 1].map(|c| 2.0 * (place[c] - cell[c] as f32) - 1.0);
+        (inside && is_trusted).then_some((cell, within))
     }
 }
 
@@ -68,8 +63,8 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
     if sides.contains(&width) && sides.contains(&height) && width * height <= MOST_PIXELS {
         return Ok(());
     }
-    let found = format!("{width} x {height}");
-    Err(Error::new("image size", "at least 2 x 2 and at most 16777216 pixels", found))
+    let expected = "at least 2 x 2 and at most 16777216 pixels";
+    Err(Error::new("image size", expected, format!("{width} x {height}")))
 }
 
 /// Makes the feature image of points in an image of `size` (width, height) pixels, in cells of
@@ -82,8 +77,7 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
 /// the nearest point. Cells without points are zero.
 ///
 /// # Errors
-/// If the columns of `points` differ in length, a side has less than 2 pixels, or the image has
-/// more than 2^24 pixels.
+/// If columns differ in length, a side has less than 2 pixels, or the image more than 2^24.
 pub fn feature_image(
     points: &Points<'_>,
     size: [usize; 2],
@@ -125,11 +119,8 @@ pub fn feature_image(
         *largest = weight.max(*largest);
     }
     for channel in values.chunks_exact_mut(plane).take(columns + 2) {
-        for (value, total) in channel.iter_mut().zip(&total) {
-            if *total > 0.0 {
-                *value /= total;
-            }
-        }
+        let seen = channel.iter_mut().zip(&total).filter(|(_, total)| **total > 0.0);
+        seen.for_each(|(value, total)| *value /= total);
     }
     Tensor::try_new(&[1, columns + PLACE, height, width], values)
 }
@@ -165,12 +156,10 @@ impl Inverter {
         self.network.sha256()
     }
 
-    /// Makes the picture of points in an image of `size` (width, height) pixels, at half that size,
-    /// rounded down.
+    /// Makes the picture of points in an image of `size` (width, height), at half that size.
     ///
     /// # Errors
-    /// If the columns of `points` differ in length, their descriptors are of another kind, a side
-    /// has less than 2 pixels, or the image has more than 2^24 pixels.
+    /// Those of [`feature_image`], and descriptors of another kind.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
         self.takes(points.descriptors)?;
         let features = feature_image(points, size, self.kind == DescriptorKind::Sift)?;
@@ -194,10 +183,10 @@ impl Inverter {
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        if descriptors.is_empty() {
-            return Ok(());
-        }
-        let kind = DescriptorKind::of(descriptors, "pictures")?;
+        let kind = match descriptors.is_empty() {
+            true => self.kind,
+            false => DescriptorKind::of(descriptors, "pictures")?,
+        };
         if kind == self.kind {
             return Ok(());
         }

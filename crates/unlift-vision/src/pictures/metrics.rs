@@ -78,8 +78,7 @@ fn similarity(sums: Sums) -> f64 {
     ((2.0 * a * b + C1) * (2.0 * ab + C2)) / ((a * a + b * b + C1) * (aa + bb + C2))
 }
 
-/// Returns the mean structural similarity over all windows of 7 x 7 pixels inside the pictures, and
-/// over the colors.
+/// Returns the mean structural similarity over all windows of 7 x 7 pixels and all colors.
 ///
 /// Source: Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity",
 /// IEEE TIP 2004, with the defaults of scikit-image, which inversion papers use: uniform windows,

@@ -1,5 +1,4 @@
-//! Pictures from keypoints and descriptors, and their similarity to photos (Sec. 4.3 and 6 of
-//! the paper).
+//! Pictures from keypoints and descriptors, and their similarity to photos (paper, Sec. 4.3, 6).
 //!
 //! ```text
 //! places, descriptors, weights ──> feature image ──> Inverter ──> picture ──> metrics, Detector

@@ -9,8 +9,7 @@ const POINTS: [[f64; 3]; 5] =
 
 type Seen = (&'static str, &'static [f64], [[f64; 2]; 5]);
 
-/// Model, parameters, and `pycolmap.Camera.img_from_cam` of each point: the middle of the first
-/// pixel at (0.5, 0.5).
+/// Model, parameters, and `pycolmap.Camera.img_from_cam` of each point, from the corner.
 #[rustfmt::skip]
 const SEEN: [Seen; 18] = [
     ("SIMPLE_PINHOLE", &[500.0, 320.0, 240.0], [[320.0, 240.0], [420.0, 173.333333], [1.818182, 421.818182], [748.571429, 561.428571], [288.75, -103.75]]),
@@ -54,13 +53,11 @@ fn points_behind_a_camera_or_beyond_a_fold_have_no_position() {
     let plain = Lens::try_new("PINHOLE", &[500.0, 500.0, 320.0, 240.0]).unwrap();
     assert_eq!(plain.project([0.1, 0.1, -1.0]), None);
     assert_eq!(plain.project([0.0, 0.0, 0.0]), None);
-    // This polynomial has its maximum at a radius of 1.15; points beyond would fold back into the
-    // image.
+    // This polynomial has its maximum at a radius of 1.15; points beyond would fold back.
     let folding = Lens::try_new("SIMPLE_RADIAL", &[500.0, 320.0, 240.0, -0.25]).unwrap();
     assert!(folding.project([1.1, 0.0, 1.0]).is_some());
     assert_eq!(folding.project([1.2, 0.0, 1.0]), None);
-    // The first model folds at a radius of 1 and rises again from 1.41; the second has a pole at
-    // 1.83.
+    // The first folds at a radius of 1 and rises again from 1.41; the second has a pole at 1.83.
     let rising = Lens::try_new("RADIAL", &[500.0, 320.0, 240.0, -0.5, 0.1]).unwrap();
     assert!(rising.project([0.9, 0.0, 1.0]).is_some());
     assert_eq!(rising.project([1.5, 0.0, 1.0]), None);
@@ -105,8 +102,7 @@ fn points_are_where_the_camera_sees_them() {
         Some([3.0, -5.0, 3.0]),
     ];
     let found = view().project(&points).unwrap();
-    // One point straight ahead, one to the right and below; the others are unknown, behind or
-    // outside.
+    // One point straight ahead, one to the right and below; others are unknown, behind or outside.
     assert_eq!(found.points, [0, 3]);
     assert_eq!(found.places, [[319.5, 239.5], [569.5, 364.5]]);
     assert_eq!(found.depths[0], 2.0);

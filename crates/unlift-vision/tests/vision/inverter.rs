@@ -24,8 +24,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// Reads the golden points, and converts positions from the corner to the middle of the first
-    /// pixel.
+    /// Reads the golden points, whose positions count from the corner of the first pixel.
     fn golden() -> Self {
         let file = SafeTensors::deserialize(GOLDEN).unwrap();
         let places = floats(&file, "places");

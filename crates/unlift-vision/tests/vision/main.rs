@@ -13,8 +13,7 @@ use std::path::{Path, PathBuf};
 
 use safetensors::SafeTensors;
 
-/// Returns a file of the evaluation data beside the repository; `None` with a message if it is
-/// missing.
+/// Returns a file of the evaluation data beside the repository; `None` if it is missing.
 fn shared(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(name);
     if !path.exists() {

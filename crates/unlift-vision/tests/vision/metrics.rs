@@ -55,8 +55,7 @@ fn detections_are_those_of_yolox() {
                 Detection { class, score: number(&one["score"]), sides }
             })
             .collect();
-        // Another JPEG decoder gives slightly different pixels, so only scores clearly above the
-        // threshold are compared.
+        // JPEG decoders differ slightly, so only scores clearly above the threshold count.
         for (these, those) in [(&found, &expected), (&expected, &found)] {
             for one in these.iter().filter(|one| one.score > 0.15) {
                 let same =

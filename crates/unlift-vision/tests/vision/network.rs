@@ -23,8 +23,7 @@ fn aliked() -> &'static Entry {
     entry("aliked-n16rot").unwrap()
 }
 
-/// Computes an input that a golden file omits because it is large: waves, times 255, as in
-/// `training/export/yolox.py`. Such ports have fixed sides.
+/// Computes a large input that a golden file omits: waves, as in `training/export/yolox.py`.
 fn waves(port: &Port) -> Tensor {
     let shape: Vec<usize> = port.shape.iter().map(|side| side.unwrap()).collect();
     let [_, channels, height, width] = shape[..] else { panic!("{shape:?}") };

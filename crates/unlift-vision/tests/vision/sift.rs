@@ -45,8 +45,7 @@ fn rows(features: &Features) -> impl Iterator<Item = Row<'_>> {
     features.keypoints.iter().zip(&features.descriptors)
 }
 
-/// Returns true if features agree within half a pixel, 5 % of scale, 5 degrees and a distance of
-/// 0.1 of descriptors of length 1.
+/// Returns true if features agree within half a pixel, 5 % of scale, 5 degrees and 0.1.
 fn alike((a, of_a): Row<'_>, (b, of_b): Row<'_>) -> bool {
     let length =
         |bytes: &[u8; 128]| bytes.iter().map(|&x| f32::from(x).powi(2)).sum::<f32>().sqrt();

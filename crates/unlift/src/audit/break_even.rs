@@ -23,8 +23,7 @@ pub enum Bound {
     AboveTested,
 }
 
-/// The lowest inlier ratio, among the tested ones and those between them, at which half of the
-/// points come back within a threshold.
+/// The lowest inlier ratio at which half of the points come back within a threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BreakEven {
     /// Scheme name.
@@ -45,12 +44,10 @@ pub struct BreakEven {
 /// Name in place of a solver's name: the strongest attack at each ratio.
 pub const STRONGEST: &str = "strongest";
 
-/// Computes break-even ratios within the headline threshold for every scheme and every noise model
-/// with oracle rows.
+/// Computes break-even ratios within the headline threshold per scheme and noise model.
 ///
-/// The first is that of the strongest attack at each ratio, if there are several attacks; then one
-/// per solver. The strongest attack includes the two baselines (blind, records alone), because an
-/// attacker with lists need not use them.
+/// The first is that of the strongest attack at each ratio, if there are several; then one per
+/// solver. The strongest attack includes both baselines, because an attacker need not use lists.
 pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
     for scheme in &plan.schemes {

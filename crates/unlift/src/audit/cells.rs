@@ -1,14 +1,14 @@
-//! Cells of an audit: the rows of one scheme and one repeat on one map or image, computed in
-//! memory.
+//! Cells of an audit: the rows of one scheme and one repeat on one map or image.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
-use super::clock::{RowSeconds, Seconds};
 use super::lists::{Kept, Lists};
 use super::missing::{NotAudited, add_new, shortened};
 use super::observer::{Cell, Observer};
 use super::plan::{Plan, key_of, oracle_seed};
 use super::row::{Alone, Row, measure, within};
+use super::run::{RowSeconds, Seconds};
 use crate::evaluate::{Accuracy, Truth, blind, distinct_weights, evaluate, joined};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle;
@@ -35,8 +35,7 @@ pub(super) struct Owned<'a, const D: usize> {
 }
 
 impl<const D: usize> Owned<'_, D> {
-    /// Returns true if the item may have fewer points than a list has entries. Images may; tiles of
-    /// a map do not.
+    /// Returns true if the item may have fewer points than a list has entries, as images may.
     fn may_be_small(&self) -> bool {
         self.name.is_some() && D == 2
     }
@@ -84,16 +83,8 @@ impl<const D: usize> Progress<'_, D> {
     }
 }
 
-/// Typical cost of attacks on the records alone, in recoveries.
-const ALONE_COST: usize = 4;
-/// Typical cost of the lists of one of the attacker's own sources, in recoveries.
-const LISTS_COST: usize = 4;
-
-/// Returns the cost of all cells of one scheme and repeat, in recoveries.
-fn cost<const D: usize>(plan: &Plan<D>) -> usize {
-    let alone = if plan.records_alone && D == 3 { ALONE_COST } else { 0 };
-    alone + plan.own_sources().count() * LISTS_COST + plan.rows_per_scheme()
-}
+/// Typical cost in recoveries of the attacks on the records alone, and of the lists of one source.
+const COST: usize = 4;
 
 /// Computes every cell of one scheme and repeat. Calls `each` with every finished row. Returns the
 /// cells without a row, for which the scheme, a source or a custom solver failed.
@@ -114,19 +105,13 @@ fn cells<const D: usize>(
         check_laws(run.scheme, original, &run.key, (&hidden.0, &hidden.1))?;
         Ok::<_, Error>(hidden)
     };
-    let made;
-    let hidden = match owned.hidden.filter(|_| scheme == plan.schemes[0].name()) {
-        Some(hidden) => hidden,
-        None => match clock.time(|s| &mut s.obfuscate, hide) {
-            Ok(hidden) => {
-                made = hidden;
-                &made
-            }
-            Err(error) if !owned.may_be_small() => {
-                return Ok(vec![NotAudited::new(scheme, None, error)]);
-            }
-            Err(error) => return Err(error.within(scheme)),
-        },
+    let given = owned.hidden.filter(|_| scheme == plan.schemes[0].name()).map(Cow::Borrowed);
+    let make = || clock.time(|s| &mut s.obfuscate, hide).map(Cow::Owned);
+    let hidden = match given.map_or_else(make, Ok) {
+        Err(error) if !owned.may_be_small() => {
+            return Ok(vec![NotAudited::new(scheme, None, error)]);
+        }
+        hidden => hidden.map_err(|error| error.within(scheme))?,
     };
     let (released, secret) = (&hidden.0, &hidden.1);
     let baseline = clock.time(|s| &mut s.evaluate, || blind(released, original, secret));
@@ -134,12 +119,12 @@ fn cells<const D: usize>(
     let mut alone = Vec::new();
     if plan.records_alone && D == 3 {
         progress.begin(&format!("{scheme}, records alone"));
-        let attack = || records_alone(hidden, original, plan, run.seed);
+        let attack = || records_alone(&hidden, original, plan, run.seed);
         alone = clock.time(|s| &mut s.records_alone, attack)?;
-        progress.done += ALONE_COST;
+        progress.done += COST;
     }
     let seeds = (run.oracle_seed, run.seed);
-    let mut sources = Lists::new(plan.k, run.search, hidden, seeds, run.kept);
+    let mut sources = Lists::new(plan.k, run.search, &hidden, seeds, run.kept);
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = variant.noise.map_or(variant.by.name(), |noise| noise.name());
@@ -155,7 +140,7 @@ fn cells<const D: usize>(
         };
         let making = started.elapsed().as_secs_f64();
         if variant.by.source().is_some() {
-            progress.done += LISTS_COST;
+            progress.done += COST;
         }
         let options =
             RecoverOptions { delta: plan.delta, seed: run.seed, ..RecoverOptions::default() };
@@ -263,8 +248,7 @@ pub fn records_alone<const D: usize>(
 /// Result of one map or image.
 #[derive(Default)]
 pub(super) struct Rows {
-    /// One row per scheme, source, noise model, inlier ratio and solver, in this order; means over
-    /// repeats.
+    /// One row per scheme, source, noise model, inlier ratio and solver: means over repeats.
     pub(super) rows: Vec<Row>,
     /// Seconds per row, summed over repeats.
     pub(super) seconds: Vec<RowSeconds>,
@@ -272,9 +256,6 @@ pub(super) struct Rows {
 }
 
 /// Computes the rows of `owned`. Calls `finished` with every row of every repeat.
-///
-/// # Errors
-/// Returns the errors of [`cells`].
 pub(super) fn of_item<const D: usize>(
     owned: &Owned<'_, D>,
     plan: &Plan<D>,
@@ -284,7 +265,8 @@ pub(super) fn of_item<const D: usize>(
 ) -> Result<Rows, Error> {
     let search = &clock.time(|s| &mut s.search, || oracle::search(owned.original))?;
     let kept = &Kept::default();
-    let per_scheme = cost(plan);
+    let n_costly = plan.own_sources().count() + usize::from(plan.records_alone && D == 3);
+    let per_scheme = n_costly * COST + plan.rows_per_scheme();
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let mut progress = Progress { observer, done: 0, total };
     let mut all = Rows::default();
@@ -293,8 +275,7 @@ pub(super) fn of_item<const D: usize>(
         let mut missing: Vec<NotAudited> = Vec::new();
         let n_before = all.rows.len();
         for repeat in 0..plan.repeats {
-            // The attacker's crate has no keys, so its seed is the integer of the repeat. Released
-            // data depends on a key.
+            // The attacker's crate has no keys, so its seed is an integer.
             let seed = plan.seed.wrapping_add(u64::from(repeat));
             let key = Key::from_seed(seed);
             let (key, oracle_seed) = match owned.name {
@@ -328,8 +309,7 @@ pub(super) fn of_item<const D: usize>(
     Ok(all)
 }
 
-/// Checks two laws of schemes for what a scheme made of `original` under `key`: every hidden point
-/// lies on its own record, and the same key gives the same map.
+/// Checks for a scheme that hidden points lie on their records, and that one key gives one map.
 ///
 /// Little can be recovered from a scheme with a bug, so a report would wrongly call it safe. Tests
 /// check the built-in schemes; custom schemes are applied a second time here.

@@ -106,8 +106,7 @@ impl<'a, const D: usize> Lists<'a, D> {
         match variant.by {
             NeighborsBy::Oracle => {
                 let ratio = variant.inlier_ratio.unwrap_or(1.0);
-                // Wrong entries need records, too, so the longest possible list can be shorter than
-                // `others`.
+                // Wrong entries need records, too, so a list may be shorter than `others`.
                 let lists = match may_be_short {
                     false => Some(self.oracle(variant, plan_k)?),
                     true => {
@@ -153,8 +152,7 @@ impl<'a, const D: usize> Lists<'a, D> {
         let about = About { map, order: RowOrder::Slots, ..About::default() };
         let lists = Neighborhoods::empty(self.released.n_slots()).with_about(about);
         let (k, ratio_at_k) = match variant.by {
-            // The metric is a mean over all points of all images, so an empty list counts with
-            // ratio 0.
+            // The metric is a mean over all points, so an empty list counts as 0.
             NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),
             NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan_k, None),
         };

@@ -1,5 +1,4 @@
-//! Audit of many images, or of the tiles of a large map. Points are pooled; a few items are in
-//! memory at a time.
+//! Audit of many images, or of the tiles of a large map, whose points are pooled.
 
 use std::collections::BTreeMap;
 use std::ops::AddAssign;
@@ -7,13 +6,12 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 
 use super::cells::{Finished, Owned, Rows, of_item};
-use super::clock::{RowSeconds, Seconds};
 use super::missing::{NotAudited, add_new};
 use super::observer::{Observer, Silent};
 use super::plan::Plan;
 use super::row::{Alone, ByReason, Distinct, Parts, Row, places_within, within};
-use super::run::Outcome;
-use super::share::{Shares, Threshold, merge, percents};
+use super::run::{Outcome, RowSeconds, Seconds};
+use super::share::{Shares, Threshold, merge};
 use crate::evaluate::{Accuracy, Reliability};
 use crate::truth::Original;
 use crate::{Descriptors, Error};
@@ -21,8 +19,7 @@ use crate::{Descriptors, Error};
 /// An image or a tile of a map with its ground truth.
 #[derive(Clone, Debug)]
 pub struct Item<const D: usize> {
-    /// Unique name, used in reports. Random seeds depend on it, so the rows of an item do not
-    /// depend on other items.
+    /// Unique name. Random seeds depend on it, so rows do not depend on other items.
     pub name: String,
     /// Keypoints of an image, in pixels, within its bounds ([`Original::within`]); points of a tile.
     pub original: Original<D>,
@@ -32,8 +29,7 @@ pub struct Item<const D: usize> {
 
 /// Receives the progress and the rows of an audit of many items.
 ///
-/// Several images are processed at the same time. Each has its own observer, which
-/// [`item`](Self::item) returns in the order of the items.
+/// Images are processed in parallel, each with an observer, which [`item`](Self::item) returns.
 pub trait Watcher<const D: usize> {
     /// Observer of one item. It runs on a thread of its own.
     type OfItem: Observer<D> + Send;
@@ -48,9 +44,8 @@ pub trait Watcher<const D: usize> {
 
     /// Called for each finished item, in order.
     ///
-    /// `rows` has one row per scheme, source, noise model, inlier ratio and solver, in this order.
-    /// Rows of a tile that could not be audited are missing. An image without keypoints has no
-    /// rows.
+    /// `rows` has one row per scheme, source, noise model, inlier ratio and solver. Rows that could
+    /// not be audited are missing, as are all of an image without keypoints.
     fn item(&mut self, name: &str, rows: &[Row], seen: Self::OfItem) {
         let _ = (name, rows, seen);
     }
@@ -67,13 +62,11 @@ impl<const D: usize> Watcher<D> for Silent {
 /// Images in progress per thread: other images keep threads busy while a large one finishes.
 const AT_WORK: usize = 2;
 
-/// Runs `plan` on all `items`: a few images at a time; tiles one by one, because each uses all
-/// threads.
+/// Runs `plan` on all `items`: a few images at a time, or one tile, which uses all threads.
 ///
 /// Rows depend only on the items, their names and the plan: byte-identical for any number of
-/// threads. Memory does not grow with the number of items. Seconds are summed over items, also over
-/// items in progress at the same time. A cell that failed in one tile has no row, because a share
-/// of some tiles is not a share of the map.
+/// threads. Memory does not grow with the number of items. Seconds are summed over items. A cell
+/// that failed in one tile has no row, because a share of some tiles is not a share of the map.
 ///
 /// # Errors
 /// When the plan is for a single item, when an item cannot be read, lacks required descriptors or
@@ -352,10 +345,8 @@ impl Pool {
             },
             assignment_accuracy_percent: sum("assignment").map(|sum| sum / n),
             sure_unknown: self.sure_unknown.clone(),
-            distinct: self.cell.distinct.as_ref().map(|_| Distinct {
-                n_places: total("places").round() as usize,
-                recovered_percent: percents(&self.shares["places"]),
-                blind_percent: percents(&self.shares["blind places"]),
+            distinct: self.cell.distinct.as_ref().map(|_| {
+                Distinct::of(total("places"), &self.shares["places"], &self.shares["blind places"])
             }),
             ..self.cell.clone()
         };
@@ -379,8 +370,7 @@ impl Errors {
         Self(counts)
     }
 
-    /// Returns the error that `percent` of `of` keypoints do not exceed, to the width of a bin;
-    /// `None` if fewer were recovered.
+    /// Returns the error that `percent` of `of` points do not exceed, if as many were recovered.
     fn percentile(&self, percent: f64, of: usize) -> Option<f64> {
         let rank = ((percent / 100.0 * of as f64).ceil() as usize).max(1);
         let mut below = 0;

@@ -7,14 +7,12 @@ use crate::Error;
 use crate::neighbors::oracle::Noise;
 use crate::truth::{DropReason, Secret};
 
-/// A scheme, or a scheme with one source, that could not be audited. It has no row, because an
-/// unknown value must not look like a small one.
+/// A scheme, or one with a source, without a row: unknown values must not look like small ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NotAudited {
     /// Scheme name.
     pub scheme: String,
-    /// Source without lists, as in [`Row::neighbors`](super::Row::neighbors); `None` if the scheme
-    /// has no rows at all.
+    /// Source without lists, as in a row; `None` if the scheme has no rows at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub neighbors: Option<String>,
     /// Noise model, if the source is the oracle; not written.
@@ -72,8 +70,7 @@ pub(super) fn add_new(known: &mut Vec<NotAudited>, more: Vec<NotAudited>) {
     }
 }
 
-/// Shortens `missing` of one scheme: a scheme without rows that failed for a single reason becomes
-/// one entry.
+/// Shortens `missing` of one scheme to one entry if it has no rows for a single reason.
 pub(super) fn shortened(missing: Vec<NotAudited>, has_rows: bool) -> Vec<NotAudited> {
     match missing.first() {
         Some(first) if !has_rows && missing.iter().all(|m| m.reason == first.reason) => {

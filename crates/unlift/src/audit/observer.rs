@@ -28,8 +28,7 @@ pub struct Cell<'a, const D: usize = 3> {
     pub secret: &'a Secret,
     /// Released map.
     pub released: &'a Released<D>,
-    /// Lists used for recovery: one per slot, in the order of descriptor rows for an attacker's own
-    /// sources.
+    /// Lists used for recovery, one per slot, in the order that they state.
     pub lists: &'a Neighborhoods,
     /// Recovered points.
     pub recovered: &'a Recovered<D>,

@@ -71,8 +71,7 @@ pub struct Variant<'a, const D: usize> {
     pub inlier_ratio: Option<f64>,
 }
 
-/// Plan of an audit: every combination of scheme, source, noise model, inlier ratio and solver
-/// becomes a row.
+/// Plan of an audit: a row per scheme, source, noise model, inlier ratio and solver.
 #[derive(Clone, Debug)]
 pub struct Plan<const D: usize> {
     /// Schemes to audit, built-in or custom.
@@ -158,8 +157,7 @@ impl<const D: usize> Plan<D> {
         self.neighbors.iter().filter_map(NeighborsBy::source)
     }
 
-    /// Returns the variants of each scheme and solver, source by source; those of the oracle noise
-    /// model by noise model.
+    /// Returns the variants of each scheme and solver, source by source and model by model.
     pub fn variants(&self) -> Vec<Variant<'_, D>> {
         let mut variants = Vec::new();
         for by in &self.neighbors {
@@ -187,7 +185,7 @@ impl<const D: usize> Plan<D> {
     pub fn check(&self, n_points: usize, has_descriptors: bool) -> Result<(), Error> {
         if n_points < self.k + 1 {
             let expected = format!("at least K + 1 = {}", self.k + 1);
-            let error = Error::new("points", expected, n_points.to_string());
+            let error = Error::new("points", expected, n_points);
             return Err(error.of_kind(ErrorKind::TooFewPoints));
         }
         self.check_fields()?;
@@ -233,10 +231,10 @@ impl<const D: usize> Plan<D> {
         }
         if self.headline >= self.thresholds.len().max(1) {
             let expected = format!("below {}", self.thresholds.len());
-            return Err(Error::new("headline threshold", expected, self.headline.to_string()));
+            return Err(Error::new("headline threshold", expected, self.headline));
         }
         if let Some(ratio) = self.inlier_ratios.iter().find(|r| !(0.0..=1.0).contains(*r)) {
-            return Err(Error::new("inlier ratio", "0 to 1", ratio.to_string()));
+            return Err(Error::new("inlier ratio", "0 to 1", ratio));
         }
         if self.repeats == 0 {
             return Err(Error::new("repeats", "at least 1", "0"));

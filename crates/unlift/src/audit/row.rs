@@ -20,8 +20,7 @@ pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 /// Numbers of points by reason.
 pub type ByReason = BTreeMap<String, usize>;
 
-/// A row of an audit, as `audit.json` contains it. Figures are means over repeats; counts are those
-/// of the first repeat.
+/// A row of an audit, as `audit.json` has it: means over repeats, and counts of the first repeat.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Scheme name, for example `ppl+`.
@@ -32,8 +31,7 @@ pub struct Row {
     pub oracle_noise: Option<String>,
     /// Inlier ratio, requested (oracle) or measured.
     pub inlier_ratio: f64,
-    /// Records per list: requested of the oracle, the longest of given lists, or chosen by an
-    /// attacker's own source.
+    /// Records per list: requested, the longest of given lists, or chosen by the source.
     ///
     /// The inlier ratio of given lists uses this many true neighbors. That of an attacker's own
     /// lists uses the K of the plan, so that short lists are not measured by a stricter rule.
@@ -72,9 +70,8 @@ pub struct Row {
     pub exact_percent: Option<f64>,
     /// Percentage of descriptors assigned to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
-    /// Figures of the plan's [measures](super::Measure) by name, and `inlier_ratio_at_k` of an
-    /// attacker's own lists, which uses as many true neighbors as they have records. Means over
-    /// repeats; over images, weighted by points.
+    /// Figures of the plan's [measures](super::Measure) by name, and `inlier_ratio_at_k` of other
+    /// lists than the oracle's, by as many true neighbors as they have records.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metrics: BTreeMap<String, f64>,
     /// Median error; lost points count as infinitely far, and `None` is infinite.
@@ -106,8 +103,7 @@ pub struct Row {
     /// Spread over repeats, if there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std: Option<Spread>,
-    /// 95 % intervals of the percentages, by their sampling error; absent in documents of earlier
-    /// versions.
+    /// 95 % intervals of the percentages; absent in documents of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<Intervals>,
     /// Shares of distinct places (images only).
@@ -123,8 +119,7 @@ pub struct Row {
 pub struct Parts {
     /// Results of all attacks on the records alone.
     pub alone: Vec<Alone>,
-    /// Reliability of the attacker's probabilities to lie within the smallest threshold; `None` for
-    /// solvers without probabilities.
+    /// Reliability of the probabilities to lie within the smallest threshold, if any.
     pub reliability: Option<Reliability>,
 }
 
@@ -160,6 +155,13 @@ pub struct Distinct {
     pub blind_percent: ByThreshold,
 }
 
+impl Distinct {
+    pub(super) fn of(places: f64, recovered: &Shares, blind: &Shares) -> Self {
+        let (recovered_percent, blind_percent) = (percents(recovered), percents(blind));
+        Self { n_places: places.round() as usize, recovered_percent, blind_percent }
+    }
+}
+
 /// Standard deviations over repeats (with n - 1).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
@@ -173,8 +175,7 @@ pub struct Spread {
     pub median_error: Option<f64>,
 }
 
-/// 95 % intervals: [Wilson's](Share::interval) over points, over images or tiles where there are
-/// several, and over repeats. The widest counts.
+/// 95 % intervals: the widest of those over points, over several items, and over repeats.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Intervals {
     /// Interval of each recovered percentage.
@@ -228,8 +229,7 @@ fn is_single(value: &u32) -> bool {
 }
 
 impl Row {
-    /// Returns the larger baseline within `threshold`, in percent: the blind guess or the best attack
-    /// on the records alone. Neighborhoods add what exceeds it.
+    /// Returns the larger baseline within `threshold`, in percent: blind, or the records alone.
     pub fn baseline_percent(&self, threshold: &str) -> Option<f64> {
         let alone = self.records_alone_percent.as_ref().and_then(|by| by.get(threshold));
         self.blind_percent.get(threshold).into_iter().chain(alone).copied().reduce(f64::max)
@@ -274,12 +274,13 @@ impl Row {
             all.reduce(|best, next| if better(&best.1, &next.1) { next } else { best })
         };
         let labels = self.recovered_percent.keys();
-        let best = labels.map(|label| Some((label.clone(), best(label)?)));
-        let best: Option<Vec<(String, (&'static str, Share))>> = best.collect();
-        let named = best.clone().into_iter().flatten().map(|(at, (name, _))| (at, name.to_owned()));
-        let shares: Shares = best.iter().flatten().map(|(at, best)| (at.clone(), best.1)).collect();
-        self.records_alone_by = best.as_ref().map(|_| named.collect());
-        self.records_alone_percent = best.map(|_| percents(&shares));
+        let best =
+            labels.filter_map(|label| best(label).map(|(name, of)| (label.clone(), name, of)));
+        let best: Vec<(String, &str, Share)> = best.collect();
+        let named = best.iter().map(|(label, name, _)| (label.clone(), (*name).to_owned()));
+        let shares = best.iter().map(|(label, _, share)| (label.clone(), *share)).collect();
+        self.records_alone_by = (!best.is_empty()).then(|| named.collect());
+        self.records_alone_percent = (!best.is_empty()).then(|| percents(&shares));
         self.interval.get_or_insert_default().records_alone_percent = intervals(&shares);
         let reliability = self.parts.reliability.as_ref();
         self.sure_percent = reliability.map(Reliability::sure_percent);
@@ -316,12 +317,8 @@ impl Row {
         weights: &[f64],
         thresholds: &[Threshold],
     ) {
-        let percents_of = |of| percents(&places_within(of, weights, thresholds));
-        self.distinct = Some(Distinct {
-            n_places: weights.iter().sum::<f64>().round() as usize,
-            recovered_percent: percents_of(accuracy),
-            blind_percent: percents_of(blind),
-        });
+        let [recovered, blind] = [accuracy, blind].map(|of| places_within(of, weights, thresholds));
+        self.distinct = Some(Distinct::of(weights.iter().sum(), &recovered, &blind));
     }
 
     pub(super) fn mean(rows: &[Row]) -> Row {
@@ -414,11 +411,9 @@ impl Row {
     }
 }
 
-/// Computes the row of `recovered` and its errors. The caller fills in scheme, source, inlier
-/// ratio, K and solver.
+/// Computes the row of `recovered` and its errors, without the fields that name the cell.
 ///
-/// `secret` is the secret that the obfuscation returned. `blind` contains the errors of the blind
-/// baseline; without it, the row has no blind figures.
+/// `secret` is that which the obfuscation returned. Without `blind`, there are no blind figures.
 ///
 /// # Errors
 /// When the three do not belong together, see [`evaluate`].

@@ -1,10 +1,10 @@
 //! Audits of one map, in the clear or obfuscated by another program.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::break_even::{BreakEven, break_even};
 use super::cells::{Owned, Rows, of_item};
-use super::clock::Seconds;
 use super::missing::NotAudited;
 use super::observer::Observer;
 use super::plan::Plan;
@@ -20,11 +20,9 @@ use crate::{Descriptors, Error};
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Outcome {
-    /// One row per scheme, source, noise model, inlier ratio and solver, in this order. Rows of
-    /// many items are over the points of all.
+    /// One row per scheme, source, noise model, inlier ratio and solver, over all points.
     pub rows: Vec<Row>,
-    /// Parts of the plan without a row: schemes that cannot be applied to the map, and sources
-    /// without lists for a scheme.
+    /// Parts of the plan without a row: refused schemes, and sources without lists for a scheme.
     pub not_audited: Vec<NotAudited>,
     /// Break-even ratios per scheme, noise model and solver.
     pub break_even: Vec<BreakEven>,
@@ -37,10 +35,8 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Creates the result of `n_items` items, of which `n_too_small` have at most K points.
-    ///
-    /// # Errors
-    /// When no scheme has a row.
+    /// Creates the result of `n_items` items, of which `n_too_small` have at most K points; an error
+    /// without any row.
     pub(super) fn new<const D: usize>(
         plan: &Plan<D>,
         all: Rows,
@@ -60,9 +56,8 @@ impl Outcome {
 
 /// Runs `plan` on a map. `descriptors` has one row per original.
 ///
-/// Rows depend only on the map, the descriptors and the plan: byte-identical for any number of
-/// threads. A scheme that cannot be applied to the map has no rows and is listed in
-/// [`not_audited`](Outcome::not_audited).
+/// Rows depend only on the arguments: byte-identical for any number of threads. A scheme that
+/// cannot be applied is in [`not_audited`](Outcome::not_audited).
 ///
 /// # Errors
 /// When the plan does not fit the map, no scheme can be applied to it, or the observer stops the audit.
@@ -120,8 +115,7 @@ pub fn scheme_called<const D: usize>(name: &str) -> Arc<dyn Scheme<D>> {
 /// in the seeds of the oracle and the attacker.
 ///
 /// # Errors
-/// When the plan does not fit the map, or when the three do not belong together: wrong ground truth
-/// would make the map look safe.
+/// When the plan does not fit the map, or the three do not belong together.
 pub fn run_released(
     (original, descriptors): (&Original<3>, Option<&Descriptors>),
     hidden: &(Released<3>, Secret),
@@ -132,4 +126,65 @@ pub fn run_released(
     plan.check(original.len(), released.descriptors().is_some())?;
     Truth { original, released, secret }.belongs()?;
     every_cell(&Owned { original, descriptors, hidden: Some(hidden), name: None }, plan, observer)
+}
+
+/// Seconds per stage. They are not part of the results.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Seconds {
+    /// Search of the originals' nearest neighbors.
+    pub search: f64,
+    /// Obfuscation, over all schemes and repeats.
+    pub obfuscate: f64,
+    /// Making of neighborhoods.
+    pub neighbors: f64,
+    /// Recovery.
+    pub recover: f64,
+    /// Attacks on the records alone, with their evaluation.
+    pub records_alone: f64,
+    /// Evaluation, including the blind baseline.
+    pub evaluate: f64,
+    /// Seconds per row, summed over repeats.
+    pub rows: Vec<RowSeconds>,
+}
+
+/// Seconds of one row.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct RowSeconds {
+    /// Making of its neighborhoods; 0 if another solver's row contains this time.
+    pub neighbors: f64,
+    /// Recovery.
+    pub recover: f64,
+}
+
+impl RowSeconds {
+    pub(super) fn add(&mut self, more: &Self) {
+        self.neighbors += more.neighbors;
+        self.recover += more.recover;
+    }
+}
+
+impl Seconds {
+    /// Does `work` and adds its time to that of a stage.
+    pub fn time<T>(
+        &mut self,
+        stage: impl Fn(&mut Self) -> &mut f64,
+        work: impl FnOnce() -> T,
+    ) -> T {
+        let started = Instant::now();
+        let result = work();
+        *stage(self) += started.elapsed().as_secs_f64();
+        result
+    }
+
+    /// Adds the stages of another clock, without the seconds per row.
+    pub(super) fn merge(&mut self, more: &Self) {
+        self.search += more.search;
+        self.obfuscate += more.obfuscate;
+        self.neighbors += more.neighbors;
+        self.recover += more.recover;
+        self.records_alone += more.records_alone;
+        self.evaluate += more.evaluate;
+    }
 }

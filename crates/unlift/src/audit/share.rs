@@ -52,14 +52,12 @@ impl WithInterval {
     }
 }
 
-/// Sums over maps, images or tiles, whose points are not independent: of items, points, points within,
-/// the squares of both, and their products.
+/// Sums over items: of items, points, points within, the squares of both, and their products.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Share([f64; 6]);
 
 impl Share {
-    /// Creates the share of `within` of the `points` of one map, image or tile. One without points says
-    /// nothing about the spread.
+    /// Creates the share of `within` of the `points` of one item; without points it is empty.
     pub fn of(within: f64, points: f64) -> Self {
         let n_items = f64::from(u8::from(points > 0.0));
         Self([n_items, points, within, points * points, within * within, points * within])
@@ -118,8 +116,7 @@ impl Share {
     }
 }
 
-/// Returns the interval of a mean over repeats: the wider of the mean interval of one repeat and the t
-/// interval by their standard deviation `std`.
+/// Returns the interval of a mean over repeats: the wider of their mean one and the t interval.
 pub(super) fn over_repeats(intervals: &[Interval], mean: f64, std: f64) -> Interval {
     let n = intervals.len() as f64;
     let end = |end: usize| intervals.iter().map(|interval| interval[end]).sum::<f64>() / n;
@@ -170,48 +167,41 @@ pub(super) fn intervals(shares: &Shares) -> IndexMap<String, Interval> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::seed::{Key, Stage};
+    use crate::seed::{Cipher, Draws, Key, Stage};
 
     /// Returns the percentage of 1,000 draws whose interval contains `truth`.
-    fn coverage(truth: f64, mut draw: impl FnMut(&mut dyn FnMut() -> f64) -> Interval) -> f64 {
+    fn coverage(truth: f64, draw: impl Fn(&mut Draws<Cipher>) -> Interval) -> f64 {
         let mut draws = Key::from_seed(7).draws(Stage::Scheme, 0);
-        let mut uniform = || draws.unit();
         let covers = |[low, high]: Interval| (low..=high).contains(&truth);
-        (0..1_000).filter(|_| covers(draw(&mut uniform))).count() as f64 / 10.0
+        (0..1_000).filter(|_| covers(draw(&mut draws))).count() as f64 / 10.0
     }
 
-    fn count(n: usize, share: f64, uniform: &mut dyn FnMut() -> f64) -> f64 {
-        (0..n).filter(|_| uniform() < share).count() as f64
-    }
-
-    /// Returns a normal number of deviation 1 (the sum of twelve uniform numbers).
-    fn normal(uniform: &mut dyn FnMut() -> f64) -> f64 {
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    /// Draws the share of `n` points, each of which is within with probability `share`.
+    fn drawn(n: usize, share: f64, draws: &mut Draws<Cipher>) -> Share {
+        Share::of((0..n).filter(|_| draws.unit() < share).count() as f64, n as f64)
     }
 
     #[test]
     fn intervals_contain_the_truth_in_95_of_100_draws() {
         for (n, share) in [(400, 0.5), (400, 0.03), (3_000, 0.2), (3_000, 0.97)] {
-            let found = coverage(100.0 * share, |uniform| {
-                Share::of(count(n, share, uniform), n as f64).interval()
-            });
+            let found = coverage(100.0 * share, |draws| drawn(n, share, draws).interval());
             assert!((93.0..=97.0).contains(&found), "{share} of {n} points: {found}");
         }
         for (n_items, share, deviation) in [(30, 0.5, 0.15), (100, 0.2, 0.05), (8, 0.6, 0.1)] {
-            let found = coverage(100.0 * share, |uniform| {
+            let found = coverage(100.0 * share, |draws| {
                 let mut all = Share::default();
                 for _ in 0..n_items {
-                    let n = 300 + (300.0 * uniform()) as usize;
-                    let of_item = share + deviation * normal(uniform);
-                    all.merge(&Share::of(count(n, of_item, uniform), n as f64));
+                    let n = 300 + draws.below(300) as usize;
+                    let of_item = share + deviation * draws.normal();
+                    all.merge(&drawn(n, of_item, draws));
                 }
                 all.interval()
             });
             assert!((93.0..=97.0).contains(&found), "{share} in {n_items} images: {found}");
         }
         for n in [2, 5, 20] {
-            let found = coverage(40.0, |uniform| {
-                let of: Vec<f64> = (0..n).map(|_| 40.0 + 3.0 * normal(uniform)).collect();
+            let found = coverage(40.0, |draws| {
+                let of: Vec<f64> = (0..n).map(|_| 40.0 + 3.0 * draws.normal()).collect();
                 let mean = of.iter().sum::<f64>() / n as f64;
                 let squares: f64 = of.iter().map(|x| (x - mean) * (x - mean)).sum();
                 let points = |x: &f64| Share::of(1e4 * x, 1e6).interval();

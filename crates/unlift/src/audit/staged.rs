@@ -1,14 +1,13 @@
-//! Stages of an audit of images for callers that process files one image at a time, with the same
-//! seeds, lists and sums.
+//! Stages of an audit for callers that process one image at a time.
 
 pub use super::plan::{key_of, oracle_seed};
 
 use super::cells::Finished;
-use super::clock::RowSeconds;
 use super::lists::{Kept, Lists};
 use super::many::{Pool, merge_counts};
 use super::plan::{NeighborsBy, Variant};
 use super::row::{ByReason, Row, dropped, measure};
+use super::run::RowSeconds;
 use super::share::Threshold;
 use crate::Error;
 use crate::evaluate::{blind, distinct_weights};
@@ -18,8 +17,7 @@ use crate::recover::Recovered;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
 
-/// Makes lists of `k` records at inlier ratio `ratio`, shorter in an image with too few points.
-/// `seed` is that of a map, or comes from [`oracle_seed`].
+/// Makes lists of `k` records at inlier ratio `ratio`, shorter in an image with few points.
 ///
 /// # Errors
 /// When the secret does not belong to these points, or a map has too few of them.

@@ -1,4 +1,4 @@
-//! Errors of a recovery: which original belongs to each row, shares within a threshold, percentiles, and weights of coincident points.
+//! Errors of a recovery: the original of each row, shares, percentiles, weights of coincident points, and reliability of probabilities.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -8,8 +8,7 @@ use crate::recover::{Recovered, Status};
 use crate::truth::{Original, Secret};
 use crate::{Error, OriginalId, RowOrder};
 
-/// Errors of a recovery. Shares are of *all* released points; a point that was not recovered is a
-/// miss.
+/// Errors of a recovery. Shares are of all released points; a lost point is a miss.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Accuracy {
     /// Error per slot in the unit of the points; infinite if not recovered.
@@ -17,9 +16,8 @@ pub struct Accuracy {
     sorted: Vec<f64>,
     /// Slots that could not be recovered, by reason.
     pub lost: BTreeMap<Status, usize>,
-    /// Number of slots recovered exactly; `None` unless the scheme exchanges coordinates. All
-    /// coordinates then equal the original's as `f32` relative to the released origin, so the
-    /// exchanged one is the very value that another record publishes.
+    /// Number of slots recovered exactly, with the original's coordinates as `f32` relative to the
+    /// released origin; `None` unless the scheme exchanges coordinates.
     pub n_exact: Option<usize>,
     /// Percentage of slots whose exchanged axis was identified (`cp`).
     pub axis_percent: Option<f64>,
@@ -34,8 +32,7 @@ pub struct Accuracy {
 /// two points. No order gives a larger share.
 ///
 /// # Errors
-/// When the three do not belong together: different released map, unit, number of slots or number
-/// of points.
+/// When the three differ in released map, unit, number of slots or number of points.
 pub fn evaluate<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
@@ -49,17 +46,13 @@ pub fn evaluate<const D: usize>(
         let expected = format!("lengths in {}, as in the ground truth", points.unit().name());
         return Err(Error::new("unit", expected, recovered.unit().name()));
     }
-    if recovered.n_slots() != secret.n_slots() {
-        let expected = format!("{} slots, as in the ground truth", secret.n_slots());
-        return Err(Error::new("recovered map", expected, recovered.n_slots().to_string()));
-    }
-    if secret.n_originals() != points.len() {
-        let expected = format!("{} originals, as in the secret", secret.n_originals());
-        return Err(Error::new("original points", expected, points.len().to_string()));
-    }
+    let (n_slots, n_originals) = (secret.n_slots(), secret.n_originals());
+    let rule = " slots, as in the ground truth";
+    Error::check_len("recovered map", recovered.n_slots(), n_slots, rule)?;
+    let rule = " originals, as in the secret";
+    Error::check_len("original points", points.len(), n_originals, rule)?;
     let accuracy = compare(recovered, original, &joined(recovered, original, secret));
-    let paired = secret.slots_per_record() > 1;
-    if !(paired && recovered.about().order == RowOrder::Unstated) {
+    if secret.slots_per_record() < 2 || recovered.about().order != RowOrder::Unstated {
         return Ok(accuracy);
     }
     let straight = compare(recovered, original, secret);
@@ -80,12 +73,10 @@ fn compare<const D: usize>(
 ) -> Accuracy {
     let positions = original.reveal().positions();
     let hidden = || secret.hidden().iter().enumerate();
-    let errors = hidden()
-        .map(|(slot, original)| match recovered.position(slot) {
-            Some(position) => distance(&position, &positions[original.index()]),
-            None => f64::INFINITY,
-        })
-        .collect();
+    let error = |(slot, original): (usize, &OriginalId)| {
+        let position = recovered.position(slot);
+        position.map_or(f64::INFINITY, |at| distance(&at, &positions[original.index()]))
+    };
     let mut lost = BTreeMap::new();
     for &status in recovered.status().iter().filter(|&&status| status != Status::Ok) {
         *lost.entry(status).or_insert(0) += 1;
@@ -103,7 +94,8 @@ fn compare<const D: usize>(
     };
     let assignment_percent =
         recovered.descriptor_row().and_then(|row| percent_equal(row, secret.descriptor_row()));
-    Accuracy { lost, n_exact, axis_percent, assignment_percent, ..Accuracy::of(errors) }
+    let errors = Accuracy::of(hidden().map(error).collect());
+    Accuracy { lost, n_exact, axis_percent, assignment_percent, ..errors }
 }
 
 fn percent_equal<T: PartialEq>(a: &[T], b: &[T]) -> Option<f64> {
@@ -151,15 +143,13 @@ impl Accuracy {
         if n == 0 { 0.0 } else { 100.0 * within as f64 / n as f64 }
     }
 
-    /// Returns the sum of `weights` (one per slot) over the points with an error of at most
-    /// `threshold`.
+    /// Returns the sum of `weights` (one per slot) over points within `threshold`.
     pub fn weight_within(&self, threshold: f64, weights: &[f64]) -> f64 {
         let within = self.errors.iter().zip(weights).filter(|(error, _)| **error <= threshold);
         within.map(|(_, weight)| weight).sum()
     }
 
-    /// Returns the error that `percent` of the points do not exceed; `None` if fewer were
-    /// recovered.
+    /// Returns the error that `percent` of the points do not exceed, if known.
     pub fn percentile(&self, percent: f64) -> Option<f64> {
         let n = self.sorted.len();
         let rank = ((percent / 100.0 * n as f64).ceil() as usize).clamp(1, n.max(1));
@@ -199,13 +189,12 @@ fn in_better_order<const D: usize>(
 ) -> Secret {
     let positions = original.reveal().positions();
     let error = |slot: usize, of: usize| {
-        recovered
-            .position(slot)
-            .map_or(0.0, |position| distance(&position, &positions[secret.hidden()[of].index()]))
+        let position = recovered.position(slot);
+        position.map_or(0.0, |at| distance(&at, &positions[secret.hidden()[of].index()]))
     };
-    secret.exchanged(|first| {
-        let second = first + 1;
-        error(first, second) + error(second, first) < error(first, first) + error(second, second)
+    secret.exchanged(|a| {
+        let b = a + 1;
+        error(a, b) + error(b, a) < error(a, a) + error(b, b)
     })
 }
 
@@ -225,6 +214,90 @@ pub fn distinct_weights<const D: usize>(original: &Original<D>, secret: &Secret)
         twins.iter().for_each(|&slot| weights[slot] = 1.0 / twins.len() as f64);
     }
     weights
+}
+
+/// Number of bins of the probability. The attacker is sure of the last one, from 90 % on.
+const BINS: usize = 10;
+
+/// Predicted probabilities and observed results, over the recovered points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reliability {
+    /// Number of released points, including lost ones.
+    pub n_points: usize,
+    /// Bins of equal width from 0 to 1.
+    pub bins: [Bin; BINS],
+}
+
+/// Points with similar probabilities.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bin {
+    /// Number of points.
+    pub n: usize,
+    /// Sum of their probabilities.
+    pub expected: f64,
+    /// Number of points within the threshold.
+    pub within: usize,
+}
+
+impl Bin {
+    fn merge(&mut self, other: &Self) {
+        self.n += other.n;
+        self.expected += other.expected;
+        self.within += other.within;
+    }
+
+    /// Returns the mean probability; `None` without points.
+    pub fn predicted(&self) -> Option<f64> {
+        (self.n > 0).then(|| self.expected / self.n as f64)
+    }
+
+    /// Returns the share within the threshold; `None` without points.
+    pub fn observed(&self) -> Option<f64> {
+        (self.n > 0).then(|| self.within as f64 / self.n as f64)
+    }
+}
+
+impl Reliability {
+    /// Returns the points of which the attacker is sure.
+    pub fn sure(&self) -> &Bin {
+        &self.bins[BINS - 1]
+    }
+
+    /// Returns the percentage of released points of which the attacker is sure.
+    pub fn sure_percent(&self) -> f64 {
+        if self.n_points == 0 { 0.0 } else { 100.0 * self.sure().n as f64 / self.n_points as f64 }
+    }
+
+    /// Returns the percentage of these points within the threshold; `None` without any.
+    pub fn sure_correct_percent(&self) -> Option<f64> {
+        self.sure().observed().map(|share| 100.0 * share)
+    }
+
+    /// Adds the points of another run.
+    pub fn merge(&mut self, other: &Self) {
+        self.n_points += other.n_points;
+        self.bins.iter_mut().zip(&other.bins).for_each(|(a, b)| a.merge(b));
+    }
+}
+
+/// Compares the probabilities of `recovered` to lie within `threshold` (unit of the map) with the
+/// `accuracy` of the same points; `None` without probabilities.
+pub fn reliability<const D: usize>(
+    recovered: &Recovered<D>,
+    accuracy: &Accuracy,
+    threshold: f64,
+) -> Option<Reliability> {
+    let confidence = recovered.confidence()?;
+    let mut bins = [Bin::default(); BINS];
+    let slots = confidence.iter().zip(recovered.status()).zip(accuracy.errors());
+    for ((confidence, _), &error) in slots.filter(|((_, status), _)| **status == Status::Ok) {
+        let probability = confidence.probability_within(threshold);
+        let bin = &mut bins[((probability * BINS as f64) as usize).min(BINS - 1)];
+        bin.n += 1;
+        bin.expected += probability;
+        bin.within += usize::from(error <= threshold);
+    }
+    Some(Reliability { n_points: recovered.n_slots(), bins })
 }
 
 #[cfg(test)]

@@ -8,9 +8,8 @@ use crate::geometry::vector::{along, distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
-/// Computes the errors of the blind baseline, which guesses from one record at a time and the box
-/// that contains the points: the image, or else the 1-99 % box of the originals. The latter makes
-/// the baseline generous, because an attacker does not have it.
+/// Computes the errors of the blind baseline, which guesses from one record at a time and the
+/// image, or else the 1-99 % box of the originals, which an attacker does not have.
 ///
 /// The guess depends on the family:
 /// - lines: the middle of the segment in the box, or the point nearest to the box's center if the

@@ -3,12 +3,10 @@
 mod accuracy;
 mod blind;
 mod plausible;
-mod reliability;
 
-pub use accuracy::{Accuracy, distinct_weights, evaluate, joined};
+pub use accuracy::{Accuracy, Bin, Reliability, distinct_weights, evaluate, joined, reliability};
 pub use blind::blind;
 pub use plausible::{
     OFF_RECORD, Truth, are_strangers, correlation, distance_to_record, nearer_to_own,
     recovered_away,
 };
-pub use reliability::{Bin, Reliability, reliability};

@@ -12,9 +12,8 @@ use crate::truth::{Original, Secret};
 /// map away. Returns this count and the number of compared positions. Without the released map,
 /// distances to the records' true points are compared.
 ///
-/// Records are in random order, so about half of the positions pass if they are of another map or
-/// in another order. An attack on records alone places nearly all positions on their own records,
-/// and clearly more than half nearer to their own points.
+/// About half of the positions pass if they are of another map or in another order; of an attack,
+/// even on records alone, clearly more do.
 pub fn nearer_to_own<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
@@ -29,16 +28,14 @@ pub fn nearer_to_own<const D: usize>(
     let points = original.reveal().positions();
     let slots = secret.slots_per_record();
     let n_records = secret.n_slots() / slots;
-    let nearest = |position: &[f64; D], record: usize| {
+    let away = |record: usize, position: &[f64; D]| {
         let hidden = &secret.hidden()[record * slots..(record + 1) * slots];
         let away = hidden.iter().map(|id| distance(position, &points[id.index()]));
         away.fold(f64::INFINITY, f64::min)
     };
-    count(positions.enumerate().filter_map(|(slot, position)| {
-        let (position, record) = (position?, slot / slots);
-        // Points at the same place are equally near.
-        Some(nearest(&position, record) <= nearest(&position, half_a_map_away(record, n_records)))
-    }))
+    let positions = positions.enumerate();
+    let positions = positions.filter_map(|(slot, position)| Some((slot / slots, position?)));
+    count_nearer(positions, n_records, away, |_, _| 0.0)
 }
 
 /// Minimum number of slots for a decision.
@@ -50,12 +47,19 @@ pub fn are_strangers((nearer, n): (usize, usize)) -> bool {
     n >= FEW && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt()
 }
 
-fn count(nearer: impl Iterator<Item = bool>) -> (usize, usize) {
-    nearer.fold((0, 0), |(nearer, n), is_nearer| (nearer + usize::from(is_nearer), n + 1))
-}
-
-fn half_a_map_away(record: usize, n_records: usize) -> usize {
-    (record + n_records.div_ceil(2)) % n_records
+/// Counts the places that are nearer to their own record than to one half a map away, and all places.
+/// `away` is the distance of a record from a place. Points at the same place have equal distances up to `rounding`.
+fn count_nearer<const D: usize>(
+    places: impl Iterator<Item = (usize, [f64; D])>,
+    n_records: usize,
+    away: impl Fn(usize, &[f64; D]) -> f64,
+    rounding: impl Fn(usize, &[f64; D]) -> f64,
+) -> (usize, usize) {
+    places.fold((0, 0), |(nearer, n), (own, place)| {
+        let far = (own + n_records.div_ceil(2)) % n_records;
+        let is_nearer = away(own, &place) <= away(far, &place) + rounding(own, &place);
+        (nearer + usize::from(is_nearer), n + 1)
+    })
 }
 
 /// Returns the record and the place of each slot with a position, relative to the released origin.
@@ -68,22 +72,16 @@ fn by_record<const D: usize>(
     positions.filter_map(move |(slot, position)| Some((slot / slots, sub(&position?, &origin))))
 }
 
-/// Counts the places that are nearer to their own record than to one half a map away, and all places.
 fn nearer_to_own_record<const D: usize>(
     released: &Released<D>,
     places: impl Iterator<Item = (usize, [f64; D])>,
 ) -> (usize, usize) {
     let records = released.obfuscation();
-    count(places.map(|(own, place)| {
-        let far = half_a_map_away(own, records.len());
-        let away = |record: usize| distance_to_record(records, record, &place);
-        // Points at the same place have equal distances up to rounding.
-        away(own) <= away(far) + rounding(records, own, &place)
-    }))
+    let away = |record: usize, place: &[f64; D]| distance_to_record(records, record, place);
+    count_nearer(places, records.len(), away, |own, place| rounding(records, own, place))
 }
 
-/// Returns the distances of recovered positions to their own records; almost 0 if rows have the
-/// order of the released map. Omits slots without a position.
+/// Returns the distances of recovered positions to their own records, almost 0 in the right order.
 pub fn recovered_away<const D: usize>(
     released: &Released<D>,
     recovered: &Recovered<D>,
@@ -93,8 +91,7 @@ pub fn recovered_away<const D: usize>(
     places.map(|(own, place)| distance_to_record(released.obfuscation(), own, &place)).collect()
 }
 
-/// Bounds are rounded by this share of their sides, and this share of the points may be outside: keypoints at the border of an
-/// image.
+/// Bounds are rounded by this share of their sides, and this share of the points may be outside, as at the border of an image.
 const BOUNDS_SLACK: f64 = 1e-3;
 const MAX_OUTSIDE: f64 = 0.01;
 /// Share of points nearer to their own records than to others, so that records clearly belong to the points.
@@ -131,10 +128,7 @@ impl<const D: usize> Truth<'_, D> {
             ("hidden points", secret.n_slots(), released.n_slots()),
             ("hidden points per record", secret.slots_per_record(), released.slots_per_record()),
         ] {
-            if expected != number {
-                let expected = format!("{expected}, as in the secret");
-                return Err(Error::new(what, expected, number.to_string()));
-            }
+            Error::check_len(what, number, expected, ", as in the secret")?;
         }
         released.fingerprint().expect(secret.map())?;
         let (nearer, n) = nearer_to_own_record(released, self.places());
@@ -165,23 +159,20 @@ impl<const D: usize> Truth<'_, D> {
         by_record(self.released, self.points().map(Some))
     }
 
-    /// Returns the distance of every hidden point to its own record, in the unit of the map. It is
-    /// almost 0 if ground truth and released map belong together. A point farther away than a
-    /// threshold cannot be recovered within it.
+    /// Returns the distance of every hidden point to its own record: almost 0, up to the noise of a
+    /// scheme. A point farther away than a threshold cannot be recovered within it.
     pub fn away_from_own(&self) -> Vec<f64> {
         let records = self.released.obfuscation();
         self.places().map(|(own, place)| distance_to_record(records, own, &place)).collect()
     }
 
-    /// Returns the largest distance of a hidden point to its own record that rounding to `f32`
-    /// explains, in the unit of the map.
+    /// Returns the largest distance of a hidden point to its own record that `f32` explains.
     pub fn farthest_for_rounding(&self) -> f64 {
         let records = self.released.obfuscation();
         self.places().map(|(own, place)| rounding(records, own, &place)).fold(0.0, f64::max)
     }
 
-    /// Returns the median rounding of records by `f32`, in the unit of the map: large if coordinates
-    /// are, as those of georeferenced maps.
+    /// Returns the median rounding of records by `f32`, large if coordinates are.
     pub fn usual_rounding(&self) -> f64 {
         let records = self.released.obfuscation();
         let own = self.places().map(|(own, place)| rounding(records, own, &place) / ROUNDINGS);
@@ -189,17 +180,15 @@ impl<const D: usize> Truth<'_, D> {
     }
 
     /// Returns whether most hidden points are off their records as by a scheme's noise: in directions
-    /// that do not depend on the place. A wrong scale, frame or order of slots moves them by their
-    /// places, or all alike, and broken records are few.
+    /// that do not depend on the place, as those of a wrong scale, frame or order do.
     pub fn is_noise(&self) -> bool {
         if median_or_zero(self.away_from_own()) <= ROUNDINGS * self.usual_rounding() {
             return false;
         }
         let records = self.released.obfuscation();
         let (nearer, n) = nearer_to_own_record(self.released, self.places());
-        let off = |(own, place)| sub(&place, &on_record(records, own, &place));
-        let off: Vec<[f64; D]> = self.places().map(off).collect();
-        let points: Vec<[f64; D]> = self.places().map(|(_, place)| place).collect();
+        let off = |(own, place)| (place, sub(&place, &on_record(records, own, &place)));
+        let (points, off): (Vec<[f64; D]>, Vec<[f64; D]>) = self.places().map(off).unzip();
         let column = |of: &[[f64; D]], c: usize| -> Vec<f64> { of.iter().map(|x| x[c]).collect() };
         // Five deviations of a correlation by chance; of few points less.
         let limit = (5.0 / (n.max(1) as f64).sqrt()).min(0.3);
@@ -316,8 +305,7 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     if spread > 0.0 { sum(&a, &b) / spread } else { 0.0 }
 }
 
-/// Returns the probability that a random decoy has less support than a random real record; equal
-/// ones count half.
+/// Returns the probability that a decoy has less support than a real record; equals count half.
 fn area(support: &[f64], decoy: &[bool]) -> f64 {
     let mut order: Vec<usize> = (0..support.len()).collect();
     order.sort_by(|&a, &b| support[a].total_cmp(&support[b]));

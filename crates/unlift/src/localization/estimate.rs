@@ -6,8 +6,7 @@ use crate::geometry::camera::{Camera, Intrinsics};
 use crate::geometry::vector::{cross, distance, dot, sub};
 use crate::seed::{Draws, Stage};
 
-/// A match of a keypoint of an image with a point of a map, of which one may be known up to a line.
-/// Places are pixels of the pinhole.
+/// A match of a keypoint, in pixels of the pinhole, with a point; one may be known up to a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
     /// The keypoint, or any place on its line.
@@ -108,8 +107,7 @@ fn size(input: &Match, camera: &Camera) -> Option<f64> {
     input.residuals(camera).map(|(r, _)| libm::hypot(r[0], r[1]))
 }
 
-/// Improves the pose by Levenberg-Marquardt on reweighted squares. `weight` is the weight of a
-/// residual of some pixels.
+/// Improves the pose by Levenberg-Marquardt; `weight` is that of a residual in pixels.
 fn refine(camera: &mut Camera, matches: &[Match], weight: impl Fn(f64) -> f64) {
     let depths = matches.iter().map(|input| distance(&input.point, &camera.pose.center));
     let depth = depths.sum::<f64>() / matches.len() as f64;
@@ -208,8 +206,7 @@ mod tests {
             (0..120).map(&mut of).collect()
         };
         let start = moved(&truth, &[0.1, -0.15, 0.1, 0.4, -0.3, 0.3]);
-        // Errors of lines are larger by about the root of two, and wrong matches of lines are
-        // inliers more often.
+        // Errors of lines are larger, and wrong matches of lines are inliers more often.
         for (kind, most) in [("point", 0.01), ("map", 0.02), ("image", 0.02)] {
             let (found, inliers) = estimate(&start, &matches(kind), 0.3, 0).unwrap();
             let PoseError { center, rotation_degrees: angle } = found.pose.error(&truth.pose);

@@ -1,7 +1,6 @@
 //! Neighborhoods: for each slot, records that probably hide points near its point.
 //!
-//! `oracle` makes them from ground truth, for experiments. An attacker's sources are re-exported
-//! from `unlift_attack::neighbors`.
+//! [`oracle`] makes them from ground truth; sources are those of `unlift_attack`.
 
 pub mod oracle;
 

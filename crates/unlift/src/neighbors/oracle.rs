@@ -11,8 +11,7 @@ use crate::truth::{Original, Secret};
 use crate::{About, Error, Fingerprint, RecordId, RowOrder};
 
 /// The true neighborhoods of every slot: the K records nearest to its original, by (distance,
-/// original id). They exclude the slot's own record and dropped points, and contain each record
-/// once (a paired line may hide two near points).
+/// original id), each once, without its own record and dropped points.
 #[derive(Clone, Debug)]
 pub struct TrueNeighbors {
     k: usize,
@@ -24,25 +23,22 @@ pub struct TrueNeighbors {
 }
 
 impl TrueNeighbors {
-    /// Finds true neighborhoods of size `k` for the obfuscation of `secret`. `knn` must be a search
-    /// over the original positions.
+    /// Finds true neighborhoods of size `k` for `secret` by a search over the originals.
     ///
     /// # Errors
     /// When `k` is 0 or fewer than `k` other records exist.
     pub fn new<const D: usize>(knn: &Knn<'_, D>, secret: &Secret, k: usize) -> Result<Self, Error> {
-        let (n_slots, slots_per_record) = (secret.n_slots(), secret.slots_per_record());
-        let n_records = n_slots / slots_per_record;
+        let slots_per_record = secret.slots_per_record();
+        let n_records = secret.n_slots() / slots_per_record;
         if k == 0 || n_records <= k {
             let expected = match n_records.saturating_sub(1) {
                 0 => "more than one record".to_owned(),
                 others => format!("between 1 and {others} (other records)"),
             };
-            return Err(Error::new("k", expected, k.to_string()));
+            return Err(Error::new("k", expected, k));
         }
-        let mut records = vec![RecordId(0); n_slots * k];
-        Nearness::new(knn, secret).each(k, &mut records, &|_, near, row| {
-            row.copy_from_slice(near);
-        });
+        let mut records = vec![RecordId(0); secret.n_slots() * k];
+        Nearness::new(knn, secret).each(k, &mut records, &|_, near, row| row.copy_from_slice(near));
         Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
     }
 
@@ -68,9 +64,8 @@ impl TrueNeighbors {
             outliers.fill(self, slot, seed, order, &mut row[keep..]);
             row.sort_unstable();
         });
-        let n_slots = self.n_records * self.slots_per_record;
-        let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
         let (n_records, slots) = (self.n_records, self.slots_per_record);
+        let offsets = (0..=n_records * slots).map(|slot| (slot * self.k) as u64).collect();
         let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots)?;
         let about = About { map: self.map, order: RowOrder::Slots, by_oracle: true };
         Ok(lists.with_about(about))
@@ -79,24 +74,20 @@ impl TrueNeighbors {
     /// Returns the number of true neighbors per list at an inlier ratio.
     fn kept(&self, inlier_ratio: f64, outliers: &Outliers) -> Result<usize, Error> {
         if !(0.0..=1.0).contains(&inlier_ratio) {
-            return Err(Error::new("inlier ratio", "0 to 1", inlier_ratio.to_string()));
+            return Err(Error::new("inlier ratio", "0 to 1", inlier_ratio));
         }
         // Lists without any true neighbor must not pass for lists with a few.
         let keep = (inlier_ratio * self.k as f64).round() as usize;
         let keep = keep.max(usize::from(inlier_ratio > 0.0));
         let n_wrong = self.k - keep;
         let (available, meaning) = match outliers {
-            Outliers::Near { per_slot, .. } => {
-                (*per_slot, "between the 2K-th and the 10K-th nearest")
-            }
-            Outliers::Uniform | Outliers::Clustered { .. } => {
-                (self.n_records - 1 - self.k, "not neighbors")
-            }
+            Outliers::Near(_, per_slot) => (*per_slot, "between the 2K-th and the 10K-th nearest"),
+            _ => (self.n_records - 1 - self.k, "not neighbors"),
         };
         if n_wrong > available {
             let what = format!("inlier ratio {inlier_ratio} at K = {}", self.k);
             let expected = format!("at least {n_wrong} records that are {meaning}");
-            return Err(Error::new(what, expected, available.to_string()));
+            return Err(Error::new(what, expected, available));
         }
         Ok(keep)
     }
@@ -114,13 +105,8 @@ impl TrueNeighbors {
         &self.records[slot * self.k..(slot + 1) * self.k]
     }
 
-    fn own(&self, slot: usize) -> RecordId {
-        RecordId::from_index(slot / self.slots_per_record)
-    }
-
-    /// Returns the share of listed entries that are true neighbors, over all slots with a list. If
-    /// the order of a record's two lists is unknown, the order with more true neighbors counts, as
-    /// in evaluation.
+    /// Returns the share of listed entries that are true neighbors. If the order of a record's two
+    /// lists is unknown, the order with more true neighbors counts, as in evaluation.
     pub fn measured_inlier_ratio(&self, lists: &Neighborhoods) -> f64 {
         let hits = |slot: usize, of: usize| {
             let near = self.of(of);
@@ -152,8 +138,7 @@ pub fn search<const D: usize>(original: &Original<D>) -> Result<Knn<'_, D>, Erro
     Knn::new(original.reveal().positions())
 }
 
-/// Additional originals to search, because own partners, shared records and dropped points do not
-/// count.
+/// Additional originals to search: own partners, shared records and dropped points do not count.
 const MARGIN: usize = 8;
 
 /// Callback with a slot, its nearest records in order, and the row to fill.
@@ -222,15 +207,13 @@ fn record_of_originals(secret: &Secret) -> Vec<Option<RecordId>> {
     record_of
 }
 
-/// Returns true if `records` contains `record`. Comparing all of them is faster than stopping
-/// early.
+/// Returns true if `records` contains `record`; comparing all is faster than stopping early.
 #[inline(always)]
 fn listed(records: &[RecordId], record: RecordId) -> bool {
     records.iter().fold(false, |hit, &known| hit | (known == record))
 }
 
-/// Translates neighbors given by original row to the records of one obfuscation. Omits dropped
-/// points, the slot's own record and repeats.
+/// Translates neighbors by original row to records, without the slot's own record and repeats.
 ///
 /// # Errors
 /// When the lists do not have one row per original, or contain an original out of range.
@@ -240,29 +223,23 @@ pub fn from_points(
     scores: Option<&[f32]>,
     secret: &Secret,
 ) -> Result<Neighborhoods, Error> {
-    let (n, slots_per_record) = (secret.n_originals(), secret.slots_per_record());
-    if offsets.len() != n + 1 {
-        let found = offsets.len().saturating_sub(1).to_string();
-        return Err(Error::new("neighbors by point", format!("{n} rows, one per point"), found));
-    }
+    let (n, n_entries) = (secret.n_originals(), neighbors.len());
+    let n_rows = offsets.len().saturating_sub(1);
+    Error::check_len("neighbors by point", n_rows, n, " rows, one per point")?;
     if let Some(at) = neighbors.iter().position(|&id| id as usize >= n) {
-        let what = format!("neighbor entry {at}");
-        return Err(Error::new(what, format!("points below {n}"), neighbors[at].to_string()));
+        let expected = format!("points below {n}");
+        return Err(Error::new(format!("neighbor entry {at}"), expected, neighbors[at]));
     }
-    let ascending = offsets[0] == 0 && offsets.is_sorted();
-    if !ascending || offsets[n] != neighbors.len() as u64 {
-        let expected = format!("ascending from 0 to {}", neighbors.len());
+    let ends = offsets.first().zip(offsets.last());
+    if ends != Some((&0, &(n_entries as u64))) || !offsets.is_sorted() {
+        let expected = format!("ascending from 0 to {n_entries}");
         return Err(Error::new("offsets of neighbors by point", expected, "another sequence"));
     }
-    if let Some(scores) = scores
-        && scores.len() != neighbors.len()
-    {
-        let expected = format!("{} rows", neighbors.len());
-        return Err(Error::new("scores of neighbors by point", expected, scores.len().to_string()));
-    }
+    let n_scores = scores.map_or(n_entries, <[_]>::len);
+    Error::check_len("scores of neighbors by point", n_scores, n_entries, " rows")?;
+    let slots_per_record = secret.slots_per_record();
     let record_of = record_of_originals(secret);
-    let mut rows = vec![0u64];
-    let mut records = Vec::new();
+    let (mut rows, mut records) = (vec![0u64], Vec::new());
     let mut kept_scores = scores.map(|_| Vec::new());
     for (slot, original) in secret.hidden().iter().enumerate() {
         let own = RecordId::from_index(slot / slots_per_record);
@@ -273,9 +250,7 @@ pub fn from_points(
                 && !records[start..].contains(&record)
             {
                 records.push(record);
-                if let (Some(kept), Some(scores)) = (&mut kept_scores, scores) {
-                    kept.push(scores[at]);
-                }
+                kept_scores.iter_mut().zip(scores).for_each(|(kept, all)| kept.push(all[at]));
             }
         }
         rows.push(records.len() as u64);
@@ -285,45 +260,32 @@ pub fn from_points(
     Ok(lists.with_about(About { map: secret.map(), order: RowOrder::Slots, ..About::default() }))
 }
 
-/// Noise model of the oracle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Noise {
-    /// Outliers are uniformly random records that are no true neighbors.
-    Uniform,
-    /// Outliers are uniformly random among the 2K-th to 10K-th nearest records: in the right
-    /// region, at the wrong place.
-    Near,
-    /// Nearby points share their outliers, as with similar-looking descriptors.
-    ///
-    /// The originals are split in half along the longest side of their box until a patch holds at
-    /// most 2K of them. Each patch has two wrong places: random originals outside the 10K nearest
-    /// of one point of the patch. The outliers of its points come from the K records nearest to
-    /// each place, and from all records if these are too few.
-    Clustered,
+unlift_attack::named! {
+    /// Noise model of the oracle.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Noise {
+        /// Outliers are uniformly random records that are no true neighbors.
+        Uniform = "uniform",
+        /// Outliers are uniformly random among the 2K-th to 10K-th nearest records: in the right
+        /// region, at the wrong place.
+        Near = "near",
+        /// Nearby points share their outliers, as with similar-looking descriptors.
+        ///
+        /// The originals are split in half along the longest side of their box until a patch holds at
+        /// most 2K of them. Outliers of a patch come from the K records nearest to two random
+        /// originals outside the 10K nearest, and from all records if these are too few.
+        Clustered = "clustered",
+    }
 }
 
 impl Noise {
-    /// All models.
-    pub const ALL: [Noise; 3] = [Self::Uniform, Self::Near, Self::Clustered];
-
-    /// Returns the name used in files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Uniform => "uniform",
-            Self::Near => "near",
-            Self::Clustered => "clustered",
-        }
-    }
-
     /// Returns the model called `name`.
     ///
     /// # Errors
     /// When there is no such model; the message lists all.
     pub fn from_name(name: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|noise| noise.name() == name).ok_or_else(|| {
-            let names: Vec<&str> = Self::ALL.iter().map(|noise| noise.name()).collect();
-            Error::new("oracle noise", format!("one of {}", names.join(", ")), name)
-        })
+        let all = || format!("one of {}", Self::ALL.map(Self::name).join(", "));
+        Self::named(name).ok_or_else(|| Error::new("oracle noise", all(), name))
     }
 }
 
@@ -338,27 +300,16 @@ const MAX_DRAWS: usize = 64;
 /// Outliers of one noise model, prepared for one obfuscation.
 #[derive(Clone, Debug)]
 pub enum Outliers {
-    /// Outliers are uniformly random records, which need no preparation.
+    /// Uniformly random records, which need no preparation.
     Uniform,
-    /// Rows of `per_slot` records in random order, slot by slot.
-    Near {
-        /// The records of all rows, end to end.
-        records: Vec<RecordId>,
-        /// Length of a row.
-        per_slot: usize,
-    },
-    /// Records that the slots of a patch share.
-    Clustered {
-        /// The records of each patch.
-        patches: Vec<Vec<RecordId>>,
-        /// The patch of each slot.
-        patch_of: Vec<u32>,
-    },
+    /// Rows of records in random order, slot by slot, and the length of a row.
+    Near(Vec<RecordId>, usize),
+    /// Records that the slots of a patch share, by patch, and the patch of each slot.
+    Clustered(Vec<Vec<RecordId>>, Vec<u32>),
 }
 
 impl Outliers {
-    /// Prepares outliers of the model `noise` for the neighborhoods `truth`. `secret` and `knn`
-    /// must be those of `truth`.
+    /// Prepares outliers of the model `noise` for `truth`, which `secret` and `knn` made.
     ///
     /// # Errors
     /// When `secret` belongs to another obfuscation.
@@ -370,10 +321,7 @@ impl Outliers {
         seed: u64,
     ) -> Result<Self, Error> {
         let n_slots = truth.n_records * truth.slots_per_record;
-        if secret.n_slots() != n_slots {
-            let found = secret.n_slots().to_string();
-            return Err(Error::new("secret", format!("{n_slots} slots"), found));
-        }
+        Error::check_len("secret", secret.n_slots(), n_slots, " slots")?;
         let nearness = Nearness::new(knn, secret);
         Ok(match noise {
             Noise::Uniform => Self::Uniform,
@@ -386,8 +334,7 @@ impl Outliers {
         let first = RING.0 * truth.k;
         let end = (RING.1 * truth.k).min(truth.n_records - 1);
         let per_slot = truth.k.min(end.saturating_sub(first));
-        let n_slots = truth.n_records * truth.slots_per_record;
-        let mut records = vec![RecordId(0); n_slots * per_slot];
+        let mut records = vec![RecordId(0); nearness.secret.n_slots() * per_slot];
         if per_slot > 0 {
             nearness.each(end, &mut records, &|slot, near, row| {
                 let ring = &mut near[first..];
@@ -398,7 +345,7 @@ impl Outliers {
                 }
             });
         }
-        Self::Near { records, per_slot }
+        Self::Near(records, per_slot)
     }
 
     fn clustered<const D: usize>(
@@ -432,16 +379,13 @@ impl Outliers {
                 }
             }
             patches.push(records);
-            for &original in *patch {
-                patch_of_original[original as usize] = at as u32;
-            }
+            patch.iter().for_each(|&row| patch_of_original[row as usize] = at as u32);
         }
         let patch_of = secret.hidden().iter().map(|id| patch_of_original[id.index()]).collect();
-        Self::Clustered { patches, patch_of }
+        Self::Clustered(patches, patch_of)
     }
 
-    /// Fills `row` with outliers of `slot`. Their order depends only on the seed and the slot, so a
-    /// shorter row is a prefix of a longer one.
+    /// Fills `row` with outliers of `slot`. A shorter row is a prefix of a longer one.
     #[inline(always)]
     fn fill(
         &self,
@@ -451,14 +395,14 @@ impl Outliers {
         scratch: &mut Vec<RecordId>,
         row: &mut [RecordId],
     ) {
-        if let Self::Near { records, per_slot } = self {
+        if let Self::Near(records, per_slot) = self {
             row.copy_from_slice(&records[slot * per_slot..][..row.len()]);
             return;
         }
-        let (near, own) = (truth.of(slot), truth.own(slot));
+        let (near, own) = (truth.of(slot), RecordId::from_index(slot / truth.slots_per_record));
         let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
         let mut at = 0;
-        if let Self::Clustered { patches, patch_of } = self {
+        if let Self::Clustered(patches, patch_of) = self {
             let alike = &patches[patch_of[slot] as usize];
             scratch.clear();
             scratch.extend(alike.iter().filter(|&&r| r != own && !listed(near, r)));

@@ -9,13 +9,11 @@ use crate::seed::{Key, Stage};
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
-/// Hides `original` with `scheme`. Returns the released map and the secret. `descriptors` has one
-/// row per original. All randomness comes from `key`; use [`Key::fresh`] for a map that is
-/// released.
+/// Hides `original`, whose rows `descriptors` have, with `scheme`. Returns the released map and the
+/// secret. All randomness comes from `key`; use [`Key::fresh`] for a map that is released.
 ///
 /// # Errors
-/// When numbers of rows differ, the scheme cannot hide these points, or coordinates are too small,
-/// too large or too coarse.
+/// When numbers of rows differ, the scheme fails, or coordinates cannot be worked with.
 pub fn obfuscate<const D: usize>(
     scheme: &dyn Scheme<D>,
     original: &Original<D>,
@@ -23,12 +21,9 @@ pub fn obfuscate<const D: usize>(
     key: &Key,
 ) -> Result<(Released<D>, Secret), Error> {
     let points = original.reveal();
-    if let Some(descriptors) = descriptors
-        && descriptors.len() != points.len()
-    {
-        let expected = format!("{} rows, one per point", points.len());
-        return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
-    }
+    let n = points.len();
+    let n_rows = descriptors.map_or(n, Descriptors::len);
+    Error::check_len("descriptors", n_rows, n, " rows, one per point")?;
     let mut changed = None;
     for change in scheme.changes() {
         if let (Some(rows), Change::Mitigation(by, _)) = (changed.as_ref().or(descriptors), change)
@@ -53,10 +48,9 @@ pub fn obfuscate<const D: usize>(
     let n_records = lifted.obfuscation.len();
     let order = key.draws(Stage::Shuffle, 0).permutation(n_records);
     let (slot_key, row_key) = (key.stage(Stage::SlotOrder), key.stage(Stage::DescriptorOrder));
-    let mut hidden = Vec::with_capacity(n_records * slots);
     let in_order = |axes: Vec<u8>| order.iter().map(|&from| axes[from as usize]).collect();
     let swapped_axis = lifted.swapped_axis.map(in_order);
-    let mut descriptor_row = Vec::with_capacity(n_records * slots);
+    let (mut hidden, mut descriptor_row) = (Vec::new(), Vec::new());
     for (record, &from) in order.iter().enumerate() {
         let (from, to) = (from as usize, record * slots);
         hidden.extend_from_slice(&lifted.hidden[from * slots..][..slots]);
@@ -81,20 +75,18 @@ pub fn obfuscate<const D: usize>(
         released = released.with_protected(protected.select(&source))?;
     }
     let released = released.with_bounds(bounds);
-    let (n, dropped) = (points.len(), lifted.dropped);
+    let dropped = lifted.dropped;
     let secret = Secret::try_new(hidden, swapped_axis, descriptor_row, dropped, n, slots)?;
     let secret = secret.with_map(Some(released.fingerprint()));
     Ok((released, secret))
 }
 
-/// Allowed size of a map in its own unit. Records are released as `f32`, which must represent the
-/// cubes of lengths, and of thousandths of them.
+/// Allowed size of a map in its own unit: `f32` must represent cubes of lengths.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-10..=1e12;
 /// Minimum size of a map, in steps between adjacent doubles.
 const STEPS: f64 = 1e4;
 
-/// Rejects maps whose coordinates are too small, too large or too coarse. Little could be recovered
-/// from them, which is not protection.
+/// Rejects maps from which little could be recovered because of their numbers.
 fn check_size<const D: usize>(points: &[[f64; D]]) -> Result<(), Error> {
     // Quantiles ignore a few outliers.
     let Some(bounds) = Bounds::quantiles(points, 0.05) else { return Ok(()) };

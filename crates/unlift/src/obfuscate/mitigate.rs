@@ -1,7 +1,6 @@
 //! Mitigations: simple changes to a map before a scheme hides it.
 //!
-//! A mitigation with a scheme is itself a scheme ([`Changed`](super::Changed)). Its name is the
-//! scheme's, followed by its steps: `ppl_thin4_bits2`.
+//! With a scheme it is itself a scheme ([`Changed`](super::Changed)): `ppl_thin4_bits2`.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -26,37 +25,32 @@ enum Step {
 
 /// Changes to a map, applied in order before a scheme hides it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mitigation {
-    steps: Vec<Step>,
-}
+pub struct Mitigation(Vec<Step>);
 
 const FORMS: &str = "thin:1/N, thin:tracks:1/N, noise:DEVIATION, bits:N, pca:N or drop:SHARE";
 
 impl Mitigation {
-    /// Parses steps separated by commas: `thin:1/4`, `thin:tracks:1/4`, `noise:0.1`, `bits:2`,
-    /// `pca:32`, `drop:0.5`.
+    /// Parses steps separated by commas: `thin:1/4,bits:2`. The error names all forms.
     ///
     /// # Errors
     /// If a step has another form, or a number is out of range.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let steps = text.split(',').map(step).collect::<Result<_, _>>()?;
-        Ok(Self { steps })
+        text.split(',').map(step).collect::<Result<_, _>>().map(Self)
     }
 
     /// Returns true if a step chooses points by the number of images that observe them.
     pub fn needs_tracks(&self) -> bool {
-        self.steps.iter().any(|step| matches!(step, Step::Thin { by_tracks: true, .. }))
+        self.0.iter().any(|step| matches!(step, Step::Thin { by_tracks: true, .. }))
     }
 
     /// Returns true if a step changes descriptors.
     pub fn changes_descriptors(&self) -> bool {
-        self.steps.iter().any(|step| !matches!(step, Step::Thin { .. }))
+        self.0.iter().any(|step| !matches!(step, Step::Thin { .. }))
     }
 
-    /// Returns true if every step fits single images: it keeps all points and learns nothing from them,
-    /// which would differ between images.
+    /// Returns true if every step fits single images: it keeps all points and learns nothing.
     pub fn fits_images(&self) -> bool {
-        self.steps.iter().all(|step| matches!(step, Step::Noise(_) | Step::Drop(_)))
+        self.0.iter().all(|step| matches!(step, Step::Noise(_) | Step::Drop(_)))
     }
 
     /// Returns the name in rows: letters, digits, `_` and `.`.
@@ -69,11 +63,10 @@ impl Mitigation {
             Step::Pca(n) => format!("pca{n}"),
             Step::Drop(share) => format!("drop{share}"),
         };
-        self.steps.iter().map(name).collect::<Vec<_>>().join("_")
+        self.0.iter().map(name).collect::<Vec<_>>().join("_")
     }
 
-    /// Returns the rows that stay, ascending. `tracks` is the number of images that observe each
-    /// point.
+    /// Returns the rows that stay, ascending; `tracks` are numbers of images per point.
     pub(super) fn kept(
         &self,
         n: usize,
@@ -81,7 +74,7 @@ impl Mitigation {
         key: &Key,
     ) -> Result<Vec<u32>, Error> {
         let mut rows: Vec<u32> = (0..n as u32).collect();
-        for (at, step) in self.steps.iter().enumerate() {
+        for (at, step) in self.0.iter().enumerate() {
             let Step::Thin { keep, by_tracks } = step else { continue };
             let mut draws = key.of_item(Stage::Mitigation, at as u64).draws(Stage::Mitigation, 0);
             // The order among equally long tracks is random, too.
@@ -105,16 +98,15 @@ impl Mitigation {
         key: &Key,
     ) -> Result<Descriptors, Error> {
         let (n, dim) = (descriptors.len(), descriptors.dim());
-        let mut lengths = vec![0.0; n];
-        let mut values = vec![0.0_f64; n * dim];
-        let mut row = vec![0.0_f32; dim];
-        for (at, to) in values.chunks_mut(dim).enumerate() {
-            descriptors.read_row(at, &mut row);
-            let length = length(&row.iter().map(|&x| x.into()).collect::<Vec<f64>>());
-            lengths[at] = length;
-            to.iter_mut().zip(&row).for_each(|(to, &x)| *to = f64::from(x) / length.max(1e-12));
+        let mut values: Vec<f64> = match descriptors.values() {
+            Values::U8(values) => values.iter().copied().map(f64::from).collect(),
+            Values::F32(values) => values.iter().copied().map(f64::from).collect(),
+        };
+        let lengths: Vec<f64> = values.chunks(dim).map(length).collect();
+        for (row, length) in values.chunks_mut(dim).zip(&lengths) {
+            row.iter_mut().for_each(|x| *x /= length.max(1e-12));
         }
-        for (at, step) in self.steps.iter().enumerate() {
+        for (at, step) in self.0.iter().enumerate() {
             let key = key.of_item(Stage::Mitigation, at as u64);
             match step {
                 Step::Thin { .. } => {}
@@ -188,17 +180,13 @@ fn quantize(values: &mut [f64], dim: usize, c: usize, bits: u32) {
     for level in 1..=levels {
         let mut end = (level * n / levels).max(start);
         // Equal values have one level.
-        while end > start
-            && end < n
-            && values[order[end] * dim + c] == values[order[end - 1] * dim + c]
-        {
+        let is_tied = |end: usize| values[order[end] * dim + c] == values[order[end - 1] * dim + c];
+        while (start + 1..n).contains(&end) && is_tied(end) {
             end += 1;
         }
-        if end > start {
-            let bin = &order[start..end];
-            let mean = bin.iter().map(|&row| values[row * dim + c]).sum::<f64>() / bin.len() as f64;
-            bin.iter().for_each(|&row| values[row * dim + c] = mean);
-        }
+        let bin = &order[start..end];
+        let mean = bin.iter().map(|&row| values[row * dim + c]).sum::<f64>() / bin.len() as f64;
+        bin.iter().for_each(|&row| values[row * dim + c] = mean);
         start = end;
     }
 }
@@ -206,7 +194,7 @@ fn quantize(values: &mut [f64], dim: usize, c: usize, bits: u32) {
 /// Projects all rows to their mean plus the first `most` principal components.
 fn project(values: &mut [f64], dim: usize, most: usize) -> Result<(), Error> {
     if most >= dim {
-        return Err(Error::new("pca", format!("below {dim} components"), most.to_string()));
+        return Err(Error::new("pca", format!("below {dim} components"), most));
     }
     let n = values.len() / dim;
     let mut mean = vec![0.0; dim];
@@ -223,16 +211,12 @@ fn project(values: &mut [f64], dim: usize, most: usize) -> Result<(), Error> {
     let eigen = SymmetricEigen::new(covariance);
     let mut order: Vec<usize> = (0..dim).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let axes: Vec<Vec<f64>> = order[..most]
-        .iter()
-        .map(|&at| eigen.eigenvectors.column(at).iter().copied().collect())
-        .collect();
     for row in values.chunks_mut(dim) {
         let away: Vec<f64> = row.iter().zip(&mean).map(|(x, mean)| x - mean).collect();
         row.copy_from_slice(&mean);
-        for axis in &axes {
+        for axis in order[..most].iter().map(|&at| eigen.eigenvectors.column(at)) {
             let along: f64 = axis.iter().zip(&away).map(|(a, x)| a * x).sum();
-            row.iter_mut().zip(axis).for_each(|(x, a)| *x += along * a);
+            row.iter_mut().zip(&axis).for_each(|(x, a)| *x += along * a);
         }
     }
     Ok(())

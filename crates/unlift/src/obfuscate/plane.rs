@@ -16,8 +16,7 @@ pub const ENTRY: Entry = Entry {
     ..Entry::new("plane", Lift::In3d(lift))
 };
 
-/// Partial localization: random thirds, one per axis. The attacker has the data of all three
-/// servers.
+/// Partial localization: random thirds, one per axis. The attacker has all three.
 fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
     let points = points.positions;
     let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();

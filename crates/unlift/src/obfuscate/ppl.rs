@@ -64,9 +64,8 @@ fn lines_through(
         };
         dropped.extend(pair.map(|original| Dropped { original, reason }));
     }
-    let through: Vec<[f64; 3]> = pairs.iter().map(|[a, _]| points[a.index()]).collect();
-    let direction: Vec<[f64; 3]> =
-        pairs.iter().map(|[a, b]| sub(&points[b.index()], &points[a.index()])).collect();
+    let ends = pairs.iter().map(|pair| pair.map(|id| points[id.index()]));
+    let (through, direction): (Vec<_>, Vec<_>) = ends.map(|[a, b]| (a, sub(&b, &a))).unzip();
     let lines = Obfuscation::Lines(Lines::through(&through, &direction)?);
     let hidden = pairs.as_flattened().to_vec();
     Ok(Lifted { slots_per_record: 2, hidden, dropped, ..Lifted::one_each(lines) })
@@ -102,9 +101,8 @@ fn lift_off_surfaces(
     let on_surface = |pair: &[OriginalId; 2]| {
         let [a, b] = pair.map(|id| points[id.index()]);
         let along = sub(&b, &a);
-        normals[pair[0].index()].is_some_and(|normal| {
-            dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
-        })
+        let limit = SIN_20_DEGREES * dot(&along, &along).sqrt();
+        normals[pair[0].index()].is_some_and(|normal| dot(&along, &normal).abs() <= limit)
     };
     let mut draws = key.draws(Stage::Scheme, 0);
     let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
@@ -125,8 +123,7 @@ fn lift_off_surfaces(
     lines_through(points, pairs, refused, dropped)
 }
 
-/// Returns for each point the normal of the surface through its K = min(1 % of the points, 100)
-/// nearest neighbors, with K even and at least 4.
+/// Returns the normal of the surface through the nearest 1 % of points (4 to 100, even) of each.
 fn normals(points: &[[f64; 3]]) -> Result<Vec<Option<[f64; 3]>>, Error> {
     if points.is_empty() {
         return Ok(Vec::new());
@@ -147,16 +144,11 @@ pub(super) fn random_pairs(
 ) -> (Vec<[OriginalId; 2]>, Vec<Dropped>) {
     let order = draws.permutation(n);
     let (pairs, odd) = order.as_chunks::<2>();
-    let pairs = pairs.iter().map(|pair| pair.map(OriginalId)).collect();
-    let dropped = odd
-        .iter()
-        .map(|&id| Dropped { original: OriginalId(id), reason: DropReason::OddPoint })
-        .collect();
-    (pairs, dropped)
+    let dropped = |&id: &u32| Dropped { original: OriginalId(id), reason: DropReason::OddPoint };
+    (pairs.iter().map(|pair| pair.map(OriginalId)).collect(), odd.iter().map(dropped).collect())
 }
 
-/// Pairs the points of the last `refused` pairs again. Returns the number of pairs that `accept`
-/// still refuses and moves them to the end.
+/// Pairs the last `refused` pairs again; returns how many are refused, which it moves to the end.
 fn pair_again(
     pairs: &mut [[OriginalId; 2]],
     refused: usize,

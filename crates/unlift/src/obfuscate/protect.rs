@@ -1,7 +1,6 @@
 //! Protection of descriptors: what a map releases in place of plain descriptors.
 //!
-//! A protection with a scheme is itself a scheme ([`Changed`](super::Changed)). Its name is the
-//! scheme's, followed by the rule: `ppl_subspace2`, `ppl_ldp256.2.8`.
+//! With a scheme it is itself a scheme ([`Changed`](super::Changed)): `ppl_ldp256.2.8`.
 
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -49,8 +48,7 @@ const MAX_OWN: f64 = 0.01;
 const SHORTEST: f64 = 1e-6;
 
 impl Protection {
-    /// Parses `subspace:2`, `subspace:4:adversarial` or `ldp:256,2,8`. Subspaces are hybrid unless
-    /// stated.
+    /// Parses `subspace:2` (hybrid), `subspace:4:adversarial` or `ldp:256,2,8`.
     ///
     /// # Errors
     /// If the text has another form, or a number is out of range.
@@ -110,7 +108,7 @@ impl Protection {
         let least = self.n_words.max(2 * MOST_DIRECTIONS);
         if rows.len() < least {
             let expected = format!("at least {least} for {}", self.name());
-            return Err(Error::new("public descriptors", expected, rows.len().to_string()));
+            return Err(Error::new("public descriptors", expected, rows.len()));
         }
         let known = Arc::new(rows.iter().map(|row| hash(row)).collect());
         let rows = if self.n_words > 0 { words(&rows, self.n_words) } else { rows };
@@ -128,24 +126,21 @@ impl Protection {
         key: &Key,
     ) -> Result<ProtectedDescriptors, Error> {
         let dim = descriptors.dim();
-        let wrong = |found: String| {
+        let public_dim = self.public.as_ref().map(|rows| rows.dim());
+        if public_dim.map_or(self.needs_public(), |public| public != dim) {
             let expected = format!("public descriptors of {dim} values for {}", self.name());
-            Error::new("protection", expected, found)
-        };
-        match &self.public {
-            None if self.needs_public() => return Err(wrong("none".into())),
-            Some(public) if public.dim() != dim => return Err(wrong(public.dim().to_string())),
-            _ if dim < 2 * MOST_DIRECTIONS => {
-                let expected = format!("descriptors of at least {} values", 2 * MOST_DIRECTIONS);
-                return Err(Error::new("protection", expected, dim.to_string()));
-            }
-            _ => {}
+            let found = public_dim.map_or("none".to_owned(), |dim| dim.to_string());
+            return Err(Error::new("protection", expected, found));
+        }
+        if dim < 2 * MOST_DIRECTIONS {
+            let expected = format!("descriptors of at least {} values", 2 * MOST_DIRECTIONS);
+            return Err(Error::new("protection", expected, dim));
         }
         let known: Vec<Vec<f32>> = self.public.iter().flat_map(|rows| unit_rows(rows)).collect();
         let key = key.stage(Stage::Protection);
         let plain: Vec<Vec<f32>> = unit_rows(descriptors).collect();
-        let (n, n_own) =
-            (plain.len(), plain.iter().filter(|row| self.known.contains(&hash(row))).count());
+        let n = plain.len();
+        let n_own = plain.iter().filter(|row| self.known.contains(&hash(row))).count();
         if n_own as f64 > MAX_OWN * n as f64 {
             let found = format!("{n_own} of the {n} descriptors to protect among them");
             return Err(Error::new("public descriptors", "those of other images", found));
@@ -182,34 +177,24 @@ impl Protection {
             Directions::Hybrid => m / 2,
         };
         let plain: Vec<f64> = plain.iter().map(|&x| x.into()).collect();
-        let mut basis: Vec<Vec<f64>> = Vec::with_capacity(m);
         let mut tries = 0;
-        while basis.len() < m {
+        let basis = orthonormal(m, |n_before| {
             tries += 1;
             // A database may have too few different entries.
-            let towards = basis.len() < n_adversarial && tries <= 16 * m;
-            let mut direction: Vec<f64> = match towards {
-                true => {
-                    let entry = &known[draws.below(known.len() as u64) as usize];
-                    entry.iter().zip(&plain).map(|(&v, d)| f64::from(v) - d).collect()
-                }
-                false => (0..dim).map(|_| draws.normal()).collect(),
-            };
-            if orthonormalize(&mut direction, &basis) {
-                basis.push(direction);
+            if n_before < n_adversarial && tries <= 16 * m {
+                let entry = &known[draws.below(known.len() as u64) as usize];
+                return entry.iter().zip(&plain).map(|(&v, d)| f64::from(v) - d).collect();
             }
-        }
-        let mut turned: Vec<Vec<f64>> = Vec::with_capacity(m);
-        while turned.len() < m {
+            (0..dim).map(|_| draws.normal()).collect()
+        });
+        let turned = orthonormal(m, |_| {
             let mut direction = vec![0.0; dim];
             for along in &basis {
                 let weight = draws.normal();
                 direction.iter_mut().zip(along).for_each(|(to, x)| *to += weight * x);
             }
-            if orthonormalize(&mut direction, &turned) {
-                turned.push(direction);
-            }
-        }
+            direction
+        });
         let mut foot = plain;
         remove(&mut foot, &turned);
         [foot].iter().chain(&turned).flatten().map(|&x| x as f32).collect()
@@ -222,17 +207,21 @@ fn hash(row: &[f32]) -> u64 {
     hasher.finish()
 }
 
-/// Makes `direction` orthogonal to `basis` and brings it to length 1; false if nothing remains.
-fn orthonormalize(direction: &mut [f64], basis: &[Vec<f64>]) -> bool {
+/// Returns `m` orthonormal directions: of those that `draw` returns, given how many there are, the parts beyond the earlier ones.
+fn orthonormal(m: usize, mut draw: impl FnMut(usize) -> Vec<f64>) -> Vec<Vec<f64>> {
     let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let before = length(direction);
-    remove(direction, basis);
-    let after = length(direction);
-    if after <= SHORTEST * before.max(SHORTEST) {
-        return false;
+    let mut basis: Vec<Vec<f64>> = Vec::with_capacity(m);
+    while basis.len() < m {
+        let mut direction = draw(basis.len());
+        let before = length(&direction);
+        remove(&mut direction, &basis);
+        let after = length(&direction);
+        if after <= SHORTEST * before.max(SHORTEST) {
+            continue;
+        }
+        basis.push(direction.into_iter().map(|x| x / after).collect());
     }
-    direction.iter_mut().for_each(|x| *x /= after);
-    true
+    basis
 }
 
 /// Removes the components along `basis`, twice for the sake of rounding.
@@ -263,14 +252,9 @@ fn subset(own: usize, m: usize, epsilon: f64, n: usize, draws: &mut Draws<Cipher
 
 /// Returns the row with the largest inner product; the first of equals.
 fn nearest(plain: &[f32], rows: &[Vec<f32>]) -> usize {
-    let mut best = (0, f32::NEG_INFINITY);
-    for (at, row) in rows.iter().enumerate() {
-        let product = inner(plain, row);
-        if product > best.1 {
-            best = (at, product);
-        }
-    }
-    best.0
+    let products = rows.iter().map(|row| inner(plain, row)).enumerate();
+    let better = |best: (usize, f32), next: (usize, f32)| if next.1 > best.1 { next } else { best };
+    products.fold((0, f32::NEG_INFINITY), better).0
 }
 
 /// Returns `n` unit-length words by spherical k-means with a fixed seed, which everyone can repeat.
@@ -416,43 +400,34 @@ mod tests {
     }
 
     #[test]
-    fn a_released_map_has_no_plain_descriptor() {
+    fn a_released_map_has_no_plain_descriptor_and_public_ones_are_not_its_own() {
         let points = PointSet::try_new(synthetic::room(1, 200).points, Unit::Meter).unwrap();
         let (original, plain) = (Original::new(points), descriptors(200, 1));
-        let public = descriptors(300, 9);
+        let rows: Vec<_> = unit_rows(&plain).collect();
         let texts = ["subspace:2", "ldp:16,2,4"];
         for (scheme, text) in
             [olc::ENTRY, ppl::ENTRY].into_iter().flat_map(|one| texts.map(|text| (one, text)))
         {
-            let protection = Protection::parse(text).unwrap().with_public(&public).unwrap();
-            let scheme = Changed::<3>::new(Arc::new(scheme), Change::Protection(protection));
+            let with = |public| Protection::parse(text).unwrap().with_public(public).unwrap();
+            let error = with(&plain).protect(&plain, &Key::from_seed(0)).unwrap_err().to_string();
+            let said = "expected those of other images, found 200 of the 200";
+            assert!(error.contains(said), "{error}");
+            let change = Change::Protection(with(&descriptors(300, 9)));
+            let scheme = Changed::<3>::new(Arc::new(scheme), change);
             let hide = |seed| obfuscate(&scheme, &original, Some(&plain), &Key::from_seed(seed));
             let (released, secret) = hide(0).unwrap();
             let by_row = secret.by_descriptor_row();
-            let (protected, guess) =
-                (released.protected().unwrap(), released.descriptors().unwrap());
-            let rows: Vec<_> = unit_rows(&plain).collect();
-            let mut guessed = unit_rows(guess).zip(by_row.hidden());
+            let mut guessed = unit_rows(released.descriptors().unwrap()).zip(by_row.hidden());
             assert!(guessed.all(|(guess, id)| guess != rows[id.index()]));
             if text.starts_with("subspace") {
                 for (row, id) in by_row.hidden().iter().enumerate() {
+                    let protected = released.protected().unwrap();
                     let similar = protected.similarities(&rows[id.index()])[row];
                     assert!((similar - 1.0).abs() < 1e-4, "{similar}");
                 }
             }
             assert_eq!(hide(0).unwrap().0, released);
             assert_ne!(hide(1).unwrap().0.fingerprint(), released.fingerprint());
-        }
-    }
-
-    #[test]
-    fn public_descriptors_that_are_the_protected_ones_are_refused() {
-        let of = descriptors(300, 9);
-        for text in ["subspace:2", "ldp:16,2,4"] {
-            let protection = Protection::parse(text).unwrap().with_public(&of).unwrap();
-            let error = protection.protect(&of, &Key::from_seed(0)).unwrap_err().to_string();
-            let said = "expected those of other images, found 300 of the 300";
-            assert!(error.contains(said), "{error}");
         }
     }
 }

@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 use rayon::prelude::*;
 
 use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
-use crate::geometry::vector::{dot, squared_distance, sub};
+use crate::geometry::vector::{along, dot, squared_distance, sub, widen};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
 use crate::truth::{DropReason, Dropped};
@@ -54,10 +54,9 @@ fn lift_by_voxel(
 ) -> Result<Lifted<3>, Error> {
     let voxel = options.voxel;
     if !(voxel.is_finite() && voxel > 0.0) {
-        return Err(Error::new("voxel", "a positive length", voxel.to_string()));
+        return Err(Error::new("voxel", "a positive length", voxel));
     }
-    // The grid starts half a voxel below the smallest coordinates, as in the authors' code
-    // (Open3D).
+    // The grid starts half a voxel below the smallest coordinates, as in Open3D.
     let mut low = [f64::INFINITY; 3];
     for point in points.positions {
         low = std::array::from_fn(|c| low[c].min(point[c]));
@@ -76,9 +75,9 @@ fn from_centers(
     choose: impl Fn(usize, &[f64; 3]) -> usize,
 ) -> Result<Lifted<3>, Error> {
     if points.len() < 2 {
-        return Err(Error::new("points", "at least 2 for two centers", points.len().to_string()));
+        return Err(Error::new("points", "at least 2 for two centers", points.len()));
     }
-    rays_from(&two_centers(points, key), points, choose)
+    rays_from(&two_centers(points, key), points, choose, |rays, _| Ok(rays))
 }
 
 /// Returns the centers of the best of several runs of k-means. They depend on points and `key` alone.
@@ -96,8 +95,7 @@ fn two_centers(points: &[[f64; 3]], key: &Key) -> [[f64; 3]; 2] {
     centers
 }
 
-/// Chooses initial centers with k-means++: the second with probability proportional to the squared
-/// distance to the first.
+/// Chooses initial centers with k-means++: the second by its squared distance to the first.
 fn spread_start(points: &[[f64; 3]], key: &Key, restart: u64) -> [[f64; 3]; 2] {
     let mut draws = key.draws(Stage::KMeans, restart);
     let first = points[draws.below(points.len() as u64) as usize];
@@ -110,8 +108,7 @@ fn spread_start(points: &[[f64; 3]], key: &Key, restart: u64) -> [[f64; 3]; 2] {
     [first, points[chosen.unwrap_or(points.len() - 1)]]
 }
 
-/// Returns the sum of squared distances and the centers of a run of Lloyd's algorithm. Sums are in row
-/// order.
+/// Returns the sum of squared distances and the centers of Lloyd's algorithm. Sums are in row order.
 fn lloyd(points: &[[f64; 3]], mut centers: [[f64; 3]; 2]) -> (f64, [[f64; 3]; 2]) {
     let mut cost = f64::INFINITY;
     for _ in 0..MAX_ROUNDS {
@@ -122,9 +119,7 @@ fn lloyd(points: &[[f64; 3]], mut centers: [[f64; 3]; 2]) -> (f64, [[f64; 3]; 2]
             let at = usize::from(second < first);
             new_cost += first.min(second);
             counts[at] += 1;
-            for c in 0..3 {
-                sums[at][c] += point[c];
-            }
+            sums[at] = along(&sums[at], 1.0, point);
         }
         for (at, center) in centers.iter_mut().enumerate() {
             if counts[at] > 0 {
@@ -140,11 +135,13 @@ fn lloyd(points: &[[f64; 3]], mut centers: [[f64; 3]; 2]) -> (f64, [[f64; 3]; 2]
     (cost, centers)
 }
 
-/// Returns rays from `centers` to every point. `choose` returns the center of a row.
+/// Returns rays from `centers` to every point, as `finish` changes them. `choose` returns the center of a
+/// row; `finish` receives the original of each ray.
 fn rays_from<const D: usize>(
     centers: &[[f64; D]],
     points: &[[f64; D]],
     choose: impl Fn(usize, &[f64; D]) -> usize,
+    finish: impl FnOnce(Rays<D>, &[OriginalId]) -> Result<Rays<D>, Error>,
 ) -> Result<Lifted<D>, Error> {
     // Rays start at the stored center, which is rounded to `f32`.
     let centers: Vec<[f64; D]> = centers.iter().map(|c| c.map(|x| f64::from(x as f32))).collect();
@@ -153,19 +150,18 @@ fn rays_from<const D: usize>(
     for (row, point) in points.iter().enumerate() {
         let original = OriginalId::from_index(row);
         let chosen = choose(row, point);
-        let along = sub(point, &centers[chosen]);
-        let length2 = dot(&along, &along);
+        let ray = sub(point, &centers[chosen]);
+        let length2 = dot(&ray, &ray);
         if length2 <= 1e-24 * dot(point, point) {
             dropped.push(Dropped { original, reason: DropReason::OnCenter });
             continue;
         }
         hidden.push(original);
         center.push(chosen as u8);
-        let length = length2.sqrt();
-        direction.push(along.map(|x| x / length));
+        direction.push(ray.map(|x| x / length2.sqrt()));
     }
-    let rays = Obfuscation::Rays(Rays::try_new(&centers, center, &direction)?);
-    Ok(Lifted { hidden, dropped, ..Lifted::one_each(rays) })
+    let rays = finish(Rays::try_new(&centers, center, &direction)?, &hidden)?;
+    Ok(Lifted { hidden, dropped, ..Lifted::one_each(Obfuscation::Rays(rays)) })
 }
 
 /// Registry entry of `dcl2d`.
@@ -179,19 +175,16 @@ pub const DCL2D: Entry = Entry {
     ..Entry::new("dcl2d", Lift::In2d(dual_convergent))
 };
 
-/// Dual convergent lines: lines through one of two anchors, chosen by the half of the image that contains
-/// the keypoint.
+/// Dual convergent lines: through one of two anchors, chosen by the half of the image.
 ///
-/// The authors have published no code. This implementation follows the paper, with these
-/// assumptions:
+/// The authors have published no code. This follows the paper, with these assumptions:
 ///
 /// - The split is vertical, at half of the width. The anchors are the two ends of the split: the
 ///   upper one for the left half, the lower one for the right half. Their distance, the image
 ///   height, is the one recommended.
 /// - A keypoint on the split belongs to the right half.
 /// - A keypoint on its anchor has no line and is dropped.
-/// - The line reveals its anchor, and so the half with its keypoint. It is therefore released as a
-///   ray from the anchor.
+/// - The line reveals its anchor, and so the half. It is therefore released as a ray.
 fn dual_convergent(
     points: &LocalPoints<'_, 2>,
     _: &Key,
@@ -204,13 +197,9 @@ fn dual_convergent(
     let half = (image.high[1] - image.low[1]) / 2.0;
     let anchors = [-1.0, 1.0].map(|side| [center[0], center[1] + side * half]);
     let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
-    let mut lifted = rays_from(&anchors, points.positions, chosen)?;
-    if let Obfuscation::Rays(rays) = lifted.obfuscation {
-        let (mut first, mut second) = (image, image);
-        (first.high[0], second.low[0]) = (center[0], center[0]);
-        lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
-    }
-    Ok(lifted)
+    let (mut first, mut second) = (image, image);
+    (first.high[0], second.low[0]) = (center[0], center[0]);
+    rays_from(&anchors, points.positions, chosen, |rays, _| rays.with_regions(vec![first, second]))
 }
 
 /// Share of the points that keep their bearing.
@@ -237,9 +226,8 @@ pub const SPHERE: Entry = Entry {
 /// length 1, and the descriptor of that point, so that the number of records stays. In the secret, a
 /// decoy stands for the point that it withholds; its ray does not pass through it.
 ///
-/// The published code confirms the center and the share. It reads maps with
-/// decoys and does not make them: the variance of the noise and the source of a decoy's descriptor
-/// are assumptions.
+/// The published code confirms the center and the share. It makes no decoys: the variance of the
+/// noise and the source of a decoy's descriptor are assumptions.
 fn among_decoys(
     points: &LocalPoints<'_, 3>,
     key: &Key,
@@ -248,29 +236,32 @@ fn among_decoys(
     let points = points.positions;
     let n = points.len();
     if n < 2 {
-        return Err(Error::new("points", "at least 2", n.to_string()));
+        return Err(Error::new("points", "at least 2", n));
     }
     let center: [f64; 3] =
         std::array::from_fn(|c| points.iter().map(|p| p[c]).sum::<f64>() / n as f64);
-    let mut lifted = rays_from(&[center], points, |_, _| 0)?;
-    let Obfuscation::Rays(rays) = &lifted.obfuscation else { return Ok(lifted) };
     let order = key.draws(Stage::Scheme, 0).permutation(n);
     let mut is_decoy = vec![true; n];
     let n_kept = (KEPT * n as f64).round() as usize;
     order[..n_kept].iter().for_each(|&row| is_decoy[row as usize] = false);
     let noise = key.stage(Stage::Scheme);
     let moved = |(direction, &OriginalId(row)): (&[f32; 3], &OriginalId)| {
-        let direction = direction.map(f64::from);
+        let direction = widen(direction);
         if !is_decoy[row as usize] {
             return direction;
         }
         let mut draws = noise.draws(1 + u64::from(row));
         direction.map(|x| x + VARIANCE.sqrt() * draws.normal())
     };
-    let directions: Vec<[f64; 3]> =
-        rays.direction().iter().zip(&lifted.hidden).map(moved).collect();
-    let centers: Vec<[f64; 3]> = rays.centers().iter().map(|c| c.map(f64::from)).collect();
-    let rays = Rays::try_new(&centers, rays.center().to_vec(), &directions)?;
-    lifted.obfuscation = Obfuscation::Rays(rays);
-    Ok(lifted)
+    rays_from(
+        &[center],
+        points,
+        |_, _| 0,
+        |rays, hidden| {
+            let directions: Vec<[f64; 3]> =
+                rays.direction().iter().zip(hidden).map(moved).collect();
+            let centers: Vec<[f64; 3]> = rays.centers().iter().map(widen).collect();
+            Rays::try_new(&centers, rays.center().to_vec(), &directions)
+        },
+    )
 }

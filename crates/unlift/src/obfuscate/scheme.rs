@@ -140,8 +140,7 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     /// Hides `points`.
     ///
     /// All randomness must come from `key` with [`Stage::Scheme`], because these draws are
-    /// released. Every original must be in exactly one slot, or dropped with a reason. No record
-    /// may be empty.
+    /// released. Every original must be in exactly one slot, or dropped with a reason.
     ///
     /// # Errors
     /// When the rule cannot hide the points, or a parameter is out of range.

@@ -1,8 +1,8 @@
-//! Pieces of furniture. The origin of a piece is the left end of its back if it stands along a wall
-//! (`x` along the wall, `y` into the room), otherwise its middle.
+//! Pieces of furniture. The origin is the left end of the back along a wall, or else the middle.
 
 use super::surfaces::Faces::{All, FrontAndTop, Standing};
-use super::surfaces::{FABRIC, GLASS, LEAVES, Outline, PATTERN, PRINT, Piece, SMOOTH, WOOD, turn};
+use super::surfaces::{FABRIC, GLASS, LEAVES, PATTERN, PRINT, Piece, SMOOTH, WOOD, turn};
+use crate::geometry::vector::sub;
 use crate::seed::Draws;
 
 /// Adds a bookshelf, 1.8 to 2.1 m high, filled with books and boxes.
@@ -30,8 +30,7 @@ pub(super) fn bookshelf(mut piece: Piece<'_>, width: f64, draws: &mut Draws) {
         }
     }
     let top = piece.at([0.0, 0.0, 0.08 + height - 0.1 + BOARD]);
-    let count = 1 + draws.below(3) as usize;
-    scatter(top, [0.1, 0.06], [width - 0.1, DEPTH], count, draws);
+    scatter(top, [0.1, 0.06], [width - 0.1, DEPTH], 1 + draws.below(3), draws);
 }
 
 /// Adds a cabinet with two doors, up to 2 m high.
@@ -46,8 +45,7 @@ pub(super) fn tall_cabinet(mut piece: Piece<'_>, width: f64, draws: &mut Draws) 
         piece.shell(handle, [handle[0] + 0.02, handle[1] + 0.03, 1.05], All, PRINT);
     }
     let top = piece.at([0.0, 0.0, height]);
-    let count = 1 + draws.below(3) as usize;
-    scatter(top, [0.05, 0.05], [width - 0.05, depth - 0.05], count, draws);
+    scatter(top, [0.05, 0.05], [width - 0.05, depth - 0.05], 1 + draws.below(3), draws);
 }
 
 /// Adds a low cabinet with drawers, and objects on top.
@@ -66,8 +64,7 @@ pub(super) fn sideboard(mut piece: Piece<'_>, width: f64, draws: &mut Draws) {
         }
     }
     let top = piece.at([0.0, 0.0, height]);
-    let count = 4 + draws.below(3) as usize;
-    scatter(top, [0.05, 0.05], [width - 0.05, depth - 0.03], count, draws);
+    scatter(top, [0.05, 0.05], [width - 0.05, depth - 0.03], 4 + draws.below(3), draws);
 }
 
 /// Adds a desk with a screen, a keyboard and objects.
@@ -133,8 +130,7 @@ pub(super) fn table(mut piece: Piece<'_>, length: f64, depth: f64, draws: &mut D
     let runner = [x - 0.1, 0.17, height + 0.003];
     piece.shell([-x + 0.1, -0.17, height], runner, FrontAndTop, PATTERN);
     let surface = piece.at([0.0, 0.0, height + 0.003]);
-    let count = 6 + draws.below(4) as usize;
-    scatter(surface, [0.06 - x, 0.05 - y], [x - 0.06, y - 0.05], count, draws);
+    scatter(surface, [0.06 - x, 0.05 - y], [x - 0.06, y - 0.05], 6 + draws.below(4), draws);
 }
 
 pub(super) fn rug(mut piece: Piece<'_>, draws: &mut Draws) {
@@ -158,8 +154,7 @@ pub(super) fn pendant(mut piece: Piece<'_>, ceiling: f64) {
 
 pub(super) fn plant(mut piece: Piece<'_>, draws: &mut Draws) {
     piece.tube([0.0; 3], [0.13, 0.17], 0.3, SMOOTH);
-    let soil = [[-0.15, -0.15, 0.29], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]];
-    piece.face(soil, Outline::Ellipse, PRINT);
+    piece.disc([0.0, 0.0, 0.29], 0.15, PRINT);
     for _ in 0..50 {
         let out: [f64; 3] = draws.direction();
         let reach = draws.between(0.06, 0.26);
@@ -211,19 +206,15 @@ pub(super) fn window(mut wall: Piece<'_>, middle: f64, draws: &mut Draws) {
     }
 }
 
-/// Places up to `count` random objects on the rectangle from `low` to `high` (at `z = 0` of the
-/// piece), at most one per grid cell, so that they do not overlap.
-fn scatter(mut piece: Piece<'_>, low: [f64; 2], high: [f64; 2], count: usize, draws: &mut Draws) {
+/// Places up to `count` random objects between `low` and `high`, at most one per grid cell.
+fn scatter(mut piece: Piece<'_>, low: [f64; 2], high: [f64; 2], count: u64, draws: &mut Draws) {
     /// Side of a cell, and largest width of an object, in meters.
     const CELL: f64 = 0.22;
-    let fits = |c: usize| ((high[c] - low[c]) / CELL) as usize;
-    let (columns, rows) = (fits(0), fits(1));
-    let cells = draws.permutation(columns * rows);
-    for &cell in cells.iter().take(count) {
-        let (column, row) = (cell as usize % columns, cell as usize / columns);
-        let pitch = |c: usize, n: usize| (high[c] - low[c]) / n as f64;
-        let x = low[0] + (column as f64 + 0.5) * pitch(0, columns);
-        let y = low[1] + (row as f64 + 0.5) * pitch(1, rows);
+    let sides = sub(&high, &low);
+    let n = sides.map(|side| (side / CELL) as usize);
+    for cell in draws.permutation(n[0] * n[1]).into_iter().take(count as usize) {
+        let cell = [cell as usize % n[0], cell as usize / n[0]];
+        let [x, y] = [0, 1].map(|c| low[c] + (cell[c] as f64 + 0.5) * (sides[c] / n[c] as f64));
         let small = turn(draws.between(-0.3, 0.3));
         thing(piece.turned([x, y, 0.0], small), draws);
     }
@@ -270,9 +261,8 @@ fn thing(mut piece: Piece<'_>, draws: &mut Draws) {
 
 /// Adds a leaf of side `size` around `at`, in random direction, visible from both sides.
 fn leaf(piece: &mut Piece<'_>, at: [f64; 3], size: f64, draws: &mut Draws) {
-    let u: [f64; 3] = draws.direction();
-    let other: [f64; 3] = draws.direction();
-    let (u, v) = (u.map(|x| x * size), other.map(|x| 0.5 * x * size));
+    let (u, v) = (draws.direction::<3>(), draws.direction::<3>());
+    let (u, v) = (u.map(|x| x * size), v.map(|x| 0.5 * x * size));
     let corner = std::array::from_fn(|c| at[c] - 0.5 * (u[c] + v[c]));
     piece.sheet(corner, u, v, LEAVES);
     piece.sheet(corner, v, u, LEAVES);
@@ -287,8 +277,7 @@ fn screen(mut piece: Piece<'_>) {
     piece.sheet([-0.13, 0.061, 0.13], [0.0, 0.0, 0.31], [0.51, 0.0, 0.0], PATTERN);
 }
 
-/// Adds a row of books, boxes and vases in a space of this width, depth and height, with fronts near
-/// its front.
+/// Adds a row of books, boxes and vases in a space of this width, depth and height.
 fn shelf_row(mut piece: Piece<'_>, [width, depth, clear]: [f64; 3], draws: &mut Draws) {
     let mut x = draws.between(0.0, 0.04);
     loop {

@@ -27,8 +27,7 @@ pub(super) fn furnished(seed: u64) -> Scene {
     scene
 }
 
-/// Adds floor, ceiling and walls. Returns one place per wall, with `x` along the wall and `y` into
-/// the room.
+/// Adds floor, ceiling and walls. Returns the place of each wall.
 fn shell(scene: &mut Scene) -> [Place; 4] {
     let [l, w, h] = scene.size;
     let wall = |origin, turn| Place { origin, turn };
@@ -113,8 +112,7 @@ fn dining(scene: &mut Scene, size: [f64; 3], draws: &mut Draws) {
     piece::pendant(middle, size[2]);
 }
 
-/// Returns the starts of pieces with these widths, in random order and with random gaps between
-/// `from` and `to`.
+/// Returns the starts of pieces with these widths, in random order and with random gaps.
 fn side_by_side(widths: [f64; 3], from: f64, to: f64, draws: &mut Draws) -> [f64; 3] {
     let slack = (to - from - widths.iter().sum::<f64>()).max(0.0);
     let gaps: [f64; 4] = std::array::from_fn(|_| 0.2 + draws.unit());

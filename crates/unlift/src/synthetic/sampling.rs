@@ -20,26 +20,21 @@ const MOST_TRIES: usize = 10_000;
 /// Returns `n` points in random order: copies, outliers, and points on surfaces.
 pub(super) fn points(seed: u64, n: usize, scene: &Scene, cameras: &[Camera]) -> Vec<[f64; 3]> {
     // A single point has no other to copy.
-    let n_copies = if n < 2 { 0 } else { share(n, COINCIDENT_SHARE) };
-    let n_outliers = share(n, OUTLIER_SHARE);
-    let sources = Sources::new(seed, scene);
+    let share = |share: f64| (n as f64 * share).round() as usize;
+    let (n_copies, n_outliers) =
+        (if n < 2 { 0 } else { share(COINCIDENT_SHARE) }, share(OUTLIER_SHARE));
+    let sources = sources(seed, scene);
     let mut points: Vec<[f64; 3]> = (0..n - n_copies)
         .map(|i| {
             let mut draws = draws(seed, Purpose::FirstPoint, i);
-            let seen = sources.seen_point(scene, cameras, &mut draws);
+            let seen = seen_point(&sources, scene, cameras, &mut draws);
             if i < n_outliers { outlier(seen, scene, &mut draws) } else { noisy(seen, &mut draws) }
         })
         .collect();
     let order = draws(seed, Purpose::Copies, 0).permutation(points.len());
-    for i in 0..n_copies {
-        points.push(points[order[i] as usize]);
-    }
+    order[..n_copies].iter().for_each(|&of| points.push(points[of as usize]));
     draws(seed, Purpose::Order, 0).shuffle(&mut points);
     points
-}
-
-fn share(n: usize, share: f64) -> usize {
-    (n as f64 * share).round() as usize
 }
 
 /// A true surface point, and the center of a photo that sees it.
@@ -48,8 +43,7 @@ struct Seen {
     camera: [f64; 3],
 }
 
-/// Adds triangulation error. It grows quadratically with the distance along the viewing ray,
-/// linearly across it. One point in ten has a bad match.
+/// Adds triangulation error, quadratic in the distance along the viewing ray, linear across it.
 fn noisy(seen: Seen, draws: &mut Draws) -> [f64; 3] {
     let ray = sub(&seen.point, &seen.camera);
     let distance = norm(&ray);
@@ -74,8 +68,8 @@ fn outlier(seen: Seen, scene: &Scene, draws: &mut Draws) -> [f64; 3] {
 }
 
 /// A source of points: a surface, its outline, or a textured patch.
-struct Source {
-    surface: usize,
+struct Source<'a> {
+    surface: &'a Surface,
     kind: Kind,
     /// Sum of weights up to and including this source.
     cumulated: f64,
@@ -87,70 +81,65 @@ enum Kind {
     Patch { s: f64, t: f64, radius: f64 },
 }
 
-struct Sources(Vec<Source>);
-
-impl Sources {
-    fn new(seed: u64, scene: &Scene) -> Self {
-        let mut sources = Self(Vec::new());
-        let mut draws = draws(seed, Purpose::Texture, 0);
-        for (index, surface) in scene.surfaces.iter().enumerate() {
-            let texture = surface.texture;
-            let area = surface.area();
-            let around = 2.0 * (norm(&surface.u) + norm(&surface.v));
-            // Contrast varies between surfaces.
-            let contrast = 0.3 + 2.0 * draws.unit() * draws.unit();
-            sources.push(index, Kind::Even, contrast * texture.even * area);
-            sources.push(index, Kind::Outline, contrast * texture.outline * around);
-            let n_patches = texture.patches * area + draws.unit();
-            for _ in 0..n_patches as usize {
-                let weight = contrast * texture.per_patch * draws.between(0.3, 1.7);
-                let radius = texture.patch_radius * draws.between(0.5, 1.5);
-                let (s, t) = (draws.unit(), draws.unit());
-                sources.push(index, Kind::Patch { s, t, radius }, weight);
-            }
+fn sources(seed: u64, scene: &Scene) -> Vec<Source<'_>> {
+    let (mut sources, mut cumulated) = (Vec::new(), 0.0);
+    let mut draws = draws(seed, Purpose::Texture, 0);
+    for surface in &scene.surfaces {
+        let mut push = |kind, weight| {
+            cumulated += weight;
+            sources.push(Source { surface, kind, cumulated });
+        };
+        let (texture, area) = (surface.texture, surface.area());
+        let around = 2.0 * (norm(&surface.u) + norm(&surface.v));
+        // Contrast varies between surfaces.
+        let contrast = 0.3 + 2.0 * draws.unit() * draws.unit();
+        push(Kind::Even, contrast * texture.even * area);
+        push(Kind::Outline, contrast * texture.outline * around);
+        let n_patches = texture.patches * area + draws.unit();
+        for _ in 0..n_patches as usize {
+            let weight = contrast * texture.per_patch * draws.between(0.3, 1.7);
+            let radius = texture.patch_radius * draws.between(0.5, 1.5);
+            push(Kind::Patch { s: draws.unit(), t: draws.unit(), radius }, weight);
         }
-        sources
     }
-
-    fn push(&mut self, surface: usize, kind: Kind, weight: f64) {
-        let cumulated = self.0.last().map_or(0.0, |s| s.cumulated) + weight;
-        self.0.push(Source { surface, kind, cumulated });
-    }
-
-    /// Returns a visible surface point. The probability grows with the number of photos that see
-    /// it.
-    fn seen_point(&self, scene: &Scene, cameras: &[Camera], draws: &mut Draws) -> Seen {
-        let total = self.0.last().map_or(0.0, |s| s.cumulated);
-        for _ in 0..MOST_TRIES {
-            let at = draws.unit() * total;
-            let source = &self.0[self.0.partition_point(|s| s.cumulated <= at)];
-            let surface = &scene.surfaces[source.surface];
-            let (s, t) = match source.kind {
-                Kind::Even => (draws.unit(), draws.unit()),
-                Kind::Outline => on_outline(norm(&surface.u), norm(&surface.v), draws),
-                Kind::Patch { s, t, radius } => (
-                    s + draws.normal() * radius / norm(&surface.u),
-                    t + draws.normal() * radius / norm(&surface.v),
-                ),
-            };
-            if !surface.holds(s, t) {
-                continue;
-            }
-            let point = surface.at(s, t);
-            let first = draws.below(cameras.len() as u64) as usize;
-            if let Some((n_views, camera)) = views(scene, cameras, surface, &point, first)
-                && n_views >= MIN_VIEWS
-                && draws.unit() * (MANY_VIEWS as f64) < n_views as f64
-            {
-                return Seen { point, camera };
-            }
-        }
-        panic!("a furnished room has surfaces that are seen");
-    }
+    sources
 }
 
-/// Returns a random `(s, t)` within some millimeters of the outline of a parallelogram with these
-/// side lengths.
+/// Returns a visible surface point. The probability grows with the number of photos that see it.
+fn seen_point(
+    sources: &[Source<'_>],
+    scene: &Scene,
+    cameras: &[Camera],
+    draws: &mut Draws,
+) -> Seen {
+    let total = sources.last().map_or(0.0, |s| s.cumulated);
+    for _ in 0..MOST_TRIES {
+        let at = draws.unit() * total;
+        let Source { surface, kind, .. } = &sources[sources.partition_point(|s| s.cumulated <= at)];
+        let (s, t) = match kind {
+            Kind::Even => (draws.unit(), draws.unit()),
+            Kind::Outline => on_outline(norm(&surface.u), norm(&surface.v), draws),
+            Kind::Patch { s, t, radius } => (
+                s + draws.normal() * radius / norm(&surface.u),
+                t + draws.normal() * radius / norm(&surface.v),
+            ),
+        };
+        if !surface.holds(s, t) {
+            continue;
+        }
+        let point = surface.at(s, t);
+        let first = draws.below(cameras.len() as u64) as usize;
+        if let Some((n_views, camera)) = views(scene, cameras, surface, &point, first)
+            && n_views >= MIN_VIEWS
+            && draws.unit() * (MANY_VIEWS as f64) < n_views as f64
+        {
+            return Seen { point, camera };
+        }
+    }
+    panic!("a furnished room has surfaces that are seen");
+}
+
+/// Returns a random `(s, t)` within some millimeters of the outline of sides `u` and `v`.
 fn on_outline(u: f64, v: f64, draws: &mut Draws) -> (f64, f64) {
     let inset = draws.unit() * draws.unit() * 0.012;
     let far = draws.unit() < 0.5;

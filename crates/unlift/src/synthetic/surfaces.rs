@@ -3,8 +3,7 @@
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, cross, dot, sub};
 
-/// Position and rotation of a piece. Its axes are: right along a wall (x), into the room (y), up
-/// (z).
+/// Position and rotation of a piece: right along a wall (x), into the room (y), up (z).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) origin: [f64; 3],
@@ -18,40 +17,24 @@ impl Place {
     }
 }
 
+/// Visible faces of a box; the number is that of the first faces in the order of [`Piece::shell`].
 #[derive(Clone, Copy, Debug)]
-struct Blocker {
-    place: Place,
-    bounds: Bounds<3>,
-}
-
-impl Blocker {
-    /// Returns true if the segment from `from` to `to` intersects the box.
-    fn blocks(&self, from: &[f64; 3], to: &[f64; 3]) -> bool {
-        let back = [self.place.turn[0], -self.place.turn[1]];
-        let start = rotate(back, sub(from, &self.place.origin));
-        let range = self.bounds.clip(&start, &rotate(back, sub(to, from)));
-        range.is_some_and(|(enter, leave)| enter.max(0.0) <= leave.min(1.0))
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Faces {
-    /// All but the bottom.
-    Standing,
-    /// All six.
-    All,
     /// Front and top, for objects side by side.
-    FrontAndTop,
+    FrontAndTop = 2,
+    /// All but the bottom.
+    Standing = 5,
+    All = 6,
 }
 
-/// Surfaces and occluding boxes of a room. Its corner is the origin, and its walls are parallel to
-/// the axes.
+/// Surfaces and occluding boxes of a room with a corner at the origin, parallel to the axes.
 #[derive(Clone, Debug)]
 pub(super) struct Scene {
     /// Length, width and height in meters.
     pub(super) size: [f64; 3],
     pub(super) surfaces: Vec<Surface>,
-    blockers: Vec<Blocker>,
+    /// Occluding boxes, each in the frame of its place.
+    blockers: Vec<(Place, Bounds<3>)>,
 }
 
 impl Scene {
@@ -68,7 +51,12 @@ impl Scene {
         // The segment ends 1 cm before the point, so that a surface does not occlude itself.
         let ray = sub(camera, point);
         let to = along(point, 0.01 / norm(&ray), &ray);
-        self.blockers.iter().any(|b| b.blocks(camera, &to))
+        self.blockers.iter().any(|(place, bounds)| {
+            let back = [place.turn[0], -place.turn[1]];
+            let start = rotate(back, sub(camera, &place.origin));
+            let range = bounds.clip(&start, &rotate(back, sub(&to, camera)));
+            range.is_some_and(|(enter, leave)| enter.max(0.0) <= leave.min(1.0))
+        })
     }
 }
 
@@ -93,18 +81,16 @@ impl Piece<'_> {
 
     /// Adds a parallelogram with a corner and two sides, visible from the side of `u x v`.
     pub(super) fn sheet(&mut self, corner: [f64; 3], u: [f64; 3], v: [f64; 3], texture: Texture) {
-        self.face([corner, u, v], Outline::Full, texture);
-    }
-
-    pub(super) fn face(
-        &mut self,
-        [corner, u, v]: [[f64; 3]; 3],
-        outline: Outline,
-        texture: Texture,
-    ) {
         let place = &self.place;
         let (corner, u, v) = (place.point(corner), rotate(place.turn, u), rotate(place.turn, v));
-        self.scene.surfaces.push(Surface { corner, u, v, outline, texture });
+        self.scene.surfaces.push(Surface { corner, u, v, is_ellipse: false, texture });
+    }
+
+    /// Adds a level square of half side `radius` around `middle`, of which only the inscribed circle is there.
+    pub(super) fn disc(&mut self, middle: [f64; 3], radius: f64, texture: Texture) {
+        let (u, v) = ([2.0 * radius, 0.0, 0.0], [0.0, 2.0 * radius, 0.0]);
+        self.sheet(add(middle, [-radius, -radius, 0.0]), u, v, texture);
+        self.scene.surfaces.last_mut().expect("a sheet").is_ellipse = true;
     }
 
     /// Adds a solid box between two corners that occludes what is behind it.
@@ -114,7 +100,7 @@ impl Piece<'_> {
     }
 
     fn occlude(&mut self, low: [f64; 3], high: [f64; 3]) {
-        self.scene.blockers.push(Blocker { place: self.place, bounds: Bounds { low, high } });
+        self.scene.blockers.push((self.place, Bounds { low, high }));
     }
 
     /// Adds the faces of a box that occludes almost nothing.
@@ -122,20 +108,14 @@ impl Piece<'_> {
         let [w, d, h] = sub(&high, &low);
         let (x, y, z) = ([w, 0.0, 0.0], [0.0, d, 0.0], [0.0, 0.0, h]);
         let (right, front, top) = (add(low, x), add(low, y), add(low, z));
-        self.sheet(front, z, x, texture);
-        self.sheet(top, x, y, texture);
-        if faces != Faces::FrontAndTop {
-            self.sheet(low, x, z, texture);
-            self.sheet(low, z, y, texture);
-            self.sheet(right, y, z, texture);
-        }
-        if faces == Faces::All {
-            self.sheet(low, y, x, texture);
+        let all =
+            [(front, z, x), (top, x, y), (low, x, z), (low, z, y), (right, y, z), (low, y, x)];
+        for &(corner, u, v) in &all[..faces as usize] {
+            self.sheet(corner, u, v, texture);
         }
     }
 
-    /// Adds an upright tube of twelve sides around `middle` (of its foot), with two radii, at the
-    /// foot and at the top.
+    /// Adds an upright tube of twelve sides with radii at the foot (`middle`) and at the top.
     pub(super) fn tube(
         &mut self,
         middle: [f64; 3],
@@ -143,28 +123,20 @@ impl Piece<'_> {
         height: f64,
         texture: Texture,
     ) {
-        let mut on_circle = [[1.0, 0.0]; 13];
         // 2 - sqrt(3) is the tangent of 15 degrees, half of a twelfth of a turn.
         let step = turn(2.0 - 3.0f64.sqrt());
-        for i in 1..13 {
-            let [x, y, _] = rotate(step, [on_circle[i - 1][0], on_circle[i - 1][1], 0.0]);
-            on_circle[i] = [x, y];
-        }
         // Edges between the twelve sides are not visible edges of the object.
         let side = Texture { outline: texture.outline / 8.0, ..texture };
-        for pair in on_circle.windows(2) {
-            let foot = |p: [f64; 2]| add(middle, [radius * p[0], radius * p[1], 0.0]);
-            let lean = [
-                (top_radius - radius) * 0.5 * (pair[0][0] + pair[1][0]),
-                (top_radius - radius) * 0.5 * (pair[0][1] + pair[1][1]),
-                height,
-            ];
-            let (from, to) = (foot(pair[0]), foot(pair[1]));
-            self.sheet(from, sub(&to, &from), lean, side);
+        let widening = (top_radius - radius) * 0.5;
+        let mut from = [1.0, 0.0, 0.0];
+        for _ in 0..12 {
+            let to = rotate(step, from);
+            let [foot, next] = [from, to].map(|p| add(middle, scale(p, radius)));
+            let lean = [widening * (from[0] + to[0]), widening * (from[1] + to[1]), height];
+            self.sheet(foot, sub(&next, &foot), lean, side);
+            from = to;
         }
-        let corner = add(middle, [-top_radius, -top_radius, height]);
-        let (u, v) = ([2.0 * top_radius, 0.0, 0.0], [0.0, 2.0 * top_radius, 0.0]);
-        self.face([corner, u, v], Outline::Ellipse, texture);
+        self.disc(add(middle, [0.0, 0.0, height]), top_radius, texture);
         // A box inside the tube is a sufficient occluder.
         let inner = 0.7 * radius.max(top_radius);
         self.occlude(add(middle, [-inner, -inner, 0.0]), add(middle, [inner, inner, height]));
@@ -200,21 +172,14 @@ pub(super) const PRINT: Texture = texture([2_100.0, 70.0, 150.0, 26.0, 0.016]);
 pub(super) const LEAVES: Texture = texture([2_000.0, 150.0, 0.0, 0.0, 0.02]);
 pub(super) const GLASS: Texture = texture([6.0, 60.0, 0.0, 0.0, 0.02]);
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Outline {
-    /// Whole parallelogram.
-    Full,
-    /// Ellipse that touches the middle of each edge.
-    Ellipse,
-}
-
 /// Flat surface, visible from the side of its normal `u x v`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surface {
     pub(super) corner: [f64; 3],
     pub(super) u: [f64; 3],
     pub(super) v: [f64; 3],
-    pub(super) outline: Outline,
+    /// True if only the ellipse is there that touches the middle of each edge.
+    is_ellipse: bool,
     pub(super) texture: Texture,
 }
 
@@ -226,14 +191,9 @@ impl Surface {
 
     /// Returns true if `(s, t)` lies on the surface.
     pub(super) fn holds(&self, s: f64, t: f64) -> bool {
+        let (x, y) = (2.0 * s - 1.0, 2.0 * t - 1.0);
         let within = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
-        match self.outline {
-            Outline::Full => within,
-            Outline::Ellipse => {
-                let (x, y) = (2.0 * s - 1.0, 2.0 * t - 1.0);
-                x * x + y * y <= 1.0
-            }
-        }
+        if self.is_ellipse { x * x + y * y <= 1.0 } else { within }
     }
 
     pub(super) fn normal(&self) -> [f64; 3] {
@@ -244,19 +204,15 @@ impl Surface {
     /// Returns the area in square meters.
     pub(super) fn area(&self) -> f64 {
         let full = norm(&cross(&self.u, &self.v));
-        match self.outline {
-            Outline::Full => full,
-            // pi / 4; three digits are enough for a density.
-            Outline::Ellipse => 0.785 * full,
-        }
+        // pi / 4; three digits are enough for a density.
+        if self.is_ellipse { 0.785 * full } else { full }
     }
 }
 
 /// Cosine and sine of a rotation about `z`.
 pub(super) type Turn = [f64; 2];
 
-/// Returns the rotation whose half angle has the tangent `t`. `sin` and `cos` differ between
-/// platforms, this does not.
+/// Returns the rotation whose half angle has the tangent `t`: the same bits on all platforms.
 pub(super) fn turn(t: f64) -> Turn {
     let norm = 1.0 + t * t;
     [(1.0 - t * t) / norm, 2.0 * t / norm]

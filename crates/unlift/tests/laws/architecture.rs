@@ -1,5 +1,4 @@
-//! Rules that the compiler does not check: dependencies between crates, size of files, and file
-//! names in documents.
+//! Rules that the compiler does not check: dependencies, size of files, names in documents.
 
 use std::fs;
 use std::path::{Path, PathBuf};

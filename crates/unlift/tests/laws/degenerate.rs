@@ -1,5 +1,4 @@
-//! Properties of recovery from inputs that determine no points: a status, never a NaN, never a
-//! panic.
+//! Recovery from inputs that determine no points: a status, never a NaN, never a panic.
 
 use std::collections::BTreeSet;
 
@@ -107,13 +106,11 @@ fn odd_maps<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
 }
 
 #[test]
-fn lists_of_a_few() {
-    seeds(2).into_iter().for_each(|seed| over_schemes!(short_lists, seed));
-}
-
-#[test]
-fn maps_of_few_places() {
-    seeds(2).into_iter().for_each(|seed| over_schemes!(odd_maps, seed));
+fn lists_of_a_few_and_maps_of_few_places() {
+    for seed in seeds(2) {
+        over_schemes!(short_lists, seed);
+        over_schemes!(odd_maps, seed);
+    }
 }
 
 #[test]

@@ -1,5 +1,4 @@
-//! Audits of maps at the limits of geometry and of numbers: counted losses or a reason, never a
-//! NaN, never "sure" of wrong positions.
+//! Audits of maps at the limits of geometry: counted losses or a reason, never a NaN.
 
 use crate::maps::{audit, *};
 

@@ -14,7 +14,7 @@ fn records_forget_their_points<const D: usize>(seed: u64) {
         let direction = draws.direction();
         let line = |from: &[f64; D], t: f64| {
             let lines = Lines::through(&[along(from, t, &direction)], &[direction]).unwrap();
-            record_bytes(&Obfuscation::Lines(lines))
+            fingerprint(Obfuscation::Lines(lines))
         };
         // Near the foot, too, where a shortcut of the normal form could reveal the point.
         let foot = along(&point, -dot(&point, &direction), &direction);
@@ -26,7 +26,7 @@ fn records_forget_their_points<const D: usize>(seed: u64) {
         let ray = |range: f64| {
             let moved = along(&center, range, &sub(&point, &center));
             let rays = Rays::try_new(&[center], vec![0], &[sub(&moved, &center)]).unwrap();
-            record_bytes(&Obfuscation::Rays(rays))
+            fingerprint(Obfuscation::Rays(rays))
         };
         // Lengths near 1, too, which a shortcut of normalization could reveal.
         let near_one = 1.0 + draws.between(-3e-7, 3e-7);
@@ -44,8 +44,7 @@ fn records_forget_where_on_them_the_point_was() {
     }
 }
 
-/// Returns two clouds, each symmetric about its middle. If opposite points move by the same factor,
-/// the mean and the centers of a ray cloud do not change.
+/// Returns two clouds whose means stay if opposite points move by the same factor.
 fn symmetric_clouds<const D: usize>(seed: u64) -> Vec<[f64; D]> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 11);
     let mut points = Vec::new();
@@ -87,19 +86,16 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(name: &str, scheme: &
                 let partner = points[original_of(slot ^ 1)];
                 moved[id] = along(&partner, by, &sub(&points[id], &partner));
             }
-            Obfuscation::Rays(rays) if rays.regions().is_some() => {
-                // Anchors do not depend on the points.
-                let center = center_of(rays, slot);
-                moved[id] = along(&center, by, &sub(&points[id], &center));
-            }
             Obfuscation::Rays(rays) => {
-                let Some(other) = slot_of(id ^ 1) else { continue };
-                let middle = if id < points.len() / 2 { [-4.0; D] } else { [4.0; D] };
-                if [slot, other].iter().any(|&slot| center_of(rays, slot) != middle) {
+                let center = center_of(rays, slot);
+                let is_on = |id: usize| slot_of(id).is_some_and(|of| center_of(rays, of) == center);
+                // Anchors do not depend on the points.
+                let opposite = rays.regions().is_none().then_some(id ^ 1);
+                if !opposite.is_none_or(is_on) {
                     continue;
                 }
-                for id in [id, id ^ 1] {
-                    moved[id] = along(&middle, by, &sub(&points[id], &middle));
+                for id in opposite.into_iter().chain([id]) {
+                    moved[id] = along(&center, by, &sub(&points[id], &center));
                 }
             }
             Obfuscation::AxisPlanes(planes) => {
@@ -117,7 +113,7 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(name: &str, scheme: &
         };
         if fixed && centers_fixed {
             tried += 1;
-            let is_same = released_bytes(&after.released) == released_bytes(&before.released);
+            let is_same = after.released.fingerprint() == before.released.fingerprint();
             assert!(is_same, "{name}: the move of point {id} changed a stored byte");
         }
     }

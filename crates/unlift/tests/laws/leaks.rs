@@ -18,8 +18,7 @@ const MAX_DEVIATIONS: f64 = 5.0;
 struct Correlations(BTreeMap<String, (f64, f64)>);
 
 impl Correlations {
-    /// Adds the correlation of `column` with `truth` in standard deviations, 1 / sqrt(n - 1) for any
-    /// values.
+    /// Adds the correlation of `column` with `truth` in standard deviations.
     fn add(&mut self, what: String, column: &[f64], truth: &[f64]) {
         let deviations = correlation(column, truth) * (truth.len() as f64 - 1.0).sqrt();
         // It is 0 if a column is constant.
@@ -36,16 +35,13 @@ impl Correlations {
     }
 }
 
-fn last_bit(x: f32) -> f64 {
-    f64::from(x.to_bits() & 1)
-}
-
 /// Returns the released values of a record that are random or result from rounding, by name.
 fn random_values<const D: usize>(
     scheme: &str,
     records: &Obfuscation<D>,
     at: usize,
 ) -> Vec<(String, f64)> {
+    let last_bit = |x: f32| f64::from(x.to_bits() & 1);
     let bits = |what: &'static str, row: &[f32; D]| -> Vec<(String, f64)> {
         (0..D).map(|c| (format!("last bit of {what} {c}"), last_bit(row[c]))).collect()
     };
@@ -77,8 +73,7 @@ fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
         let hidden = hide(scheme, &points, 1_000 + key);
         let per = hidden.released.slots_per_record();
         // Each record is compared with the original of its first slot.
-        let slots: Vec<usize> =
-            (0..hidden.released.n_records()).map(|record| record * per).collect();
+        let slots: Vec<usize> = (0..hidden.released.n_slots()).step_by(per).collect();
         let original = |slot: usize| f64::from(hidden.secret.hidden()[slot].0);
         let of_slots = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             slots.iter().map(|&slot| of(slot)).collect()
@@ -103,8 +98,8 @@ fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
         if per == 2 {
             // The order of a record's two slots must not depend on the order of its points.
             let first = of_slots(&|slot| (original(slot + 1) - original(slot)).signum());
-            let along =
-                of_slots(&|slot| (hidden.local(slot)[0] - hidden.local(slot + 1)[0]).signum());
+            let x = |slot: usize| hidden.local(slot)[0];
+            let along = of_slots(&|slot| (x(slot) - x(slot + 1)).signum());
             let alternating: Vec<f64> = (0..slots.len()).map(|at| (at % 2) as f64).collect();
             for (what, signs) in [("row", &first), ("x", &along)] {
                 let mean = signs.iter().sum::<f64>() / (signs.len() as f64).sqrt();

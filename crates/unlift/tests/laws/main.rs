@@ -1,5 +1,4 @@
-//! Tests of the library. Property tests over all schemes (STYLE.md, rule 13) run on every entry of the registry, so that new schemes are
-//! tested automatically.
+//! Tests of the library. Property tests run over all registered schemes (STYLE.md, rule 13).
 
 /// Runs `law(name, scheme, arguments..)` on every scheme.
 macro_rules! over_schemes {

@@ -17,7 +17,9 @@ pub use unlift::recover::{
 pub use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 pub use unlift::seed::{Draws, Key, Stage};
 pub use unlift::truth::{Original, Secret};
-pub use unlift::{About, Descriptors, Error, PointSet, RecordId, RowOrder, Unit, synthetic};
+pub use unlift::{
+    About, Descriptors, Error, Fingerprint, PointSet, RecordId, RowOrder, Unit, synthetic,
+};
 pub use unlift_testkit::{on_threads, piles, room, uniform};
 
 /// Returns `n` seeds, the same in every run. With `UNLIFT_RANDOM_TESTS=50`, 50 seeds that differ in every run; a failure prints them.
@@ -108,8 +110,7 @@ impl<const D: usize> Hidden<D> {
         lists_of(rows, self.released.n_records(), self.released.slots_per_record())
     }
 
-    /// Returns lists of all records that hide at the place of a slot; `place` maps an original to
-    /// its place, if it counts.
+    /// Returns lists of all records that hide at the place of a slot, if it has one.
     pub fn lists_by_place(&self, place: impl Fn(usize) -> Option<usize>) -> Vec<Vec<u32>> {
         let (n, per) = (self.released.n_slots(), self.released.slots_per_record());
         let place = |slot: usize| place(self.secret.hidden()[slot].index());
@@ -131,12 +132,6 @@ impl<const D: usize> Hidden<D> {
     /// Returns the distance of the position of `slot` to its original; NaN if it is lost.
     pub fn error(&self, recovered: &Recovered<D>, slot: usize) -> f64 {
         distance(&widen(&recovered.positions()[slot]), &self.local(slot))
-    }
-
-    /// Returns the error of the median slot.
-    pub fn median_error(&self, recovered: &Recovered<D>) -> f64 {
-        let errors = (0..self.released.n_slots()).map(|slot| self.error(recovered, slot));
-        median(&mut errors.collect::<Vec<_>>())
     }
 
     /// Returns the percentage of slots that `recovered` places within `most`.
@@ -183,8 +178,7 @@ pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> 
     hidden.lists_of(&(0..hidden.released.n_slots()).map(row).collect::<Vec<_>>())
 }
 
-/// Returns a plan for these schemes and solvers, without the attack on records alone. All schemes
-/// if none is named.
+/// Returns a plan for these schemes (or all) and solvers, without attacks on records alone.
 pub fn plan<const D: usize>(
     unit: Unit,
     schemes: &[&str],
@@ -253,8 +247,7 @@ pub fn random_descriptors(seed: u64, n: usize, dim: usize) -> Descriptors {
     Descriptors::try_new(Values::F32(values), dim).unwrap()
 }
 
-/// Returns the records, brought to normal form again. With draws, they start from another form: lines reversed and through another of
-/// their points, centers in another order.
+/// Returns the records, brought to normal form again; with draws, from another form of lines and another order of centers.
 pub fn again<const D: usize>(
     records: &Obfuscation<D>,
     mut draws: Option<&mut Draws>,
@@ -302,36 +295,15 @@ pub fn released_of<const D: usize>(like: &Released<D>, records: Obfuscation<D>) 
     Released::try_new(records, per, origin, unit, None).unwrap().with_bounds(like.bounds())
 }
 
-fn bits(values: &[f32]) -> impl Iterator<Item = u8> + '_ {
-    values.iter().flat_map(|x| x.to_bits().to_le_bytes())
-}
-
-/// Returns every stored bit of a family of records.
-pub fn record_bytes<const D: usize>(obfuscation: &Obfuscation<D>) -> Vec<u8> {
-    let flat = |rows: &[[f32; D]]| bits(rows.as_flattened()).collect::<Vec<u8>>();
-    match obfuscation {
-        Obfuscation::Lines(lines) => [flat(lines.foot()), flat(lines.direction())].concat(),
-        Obfuscation::Rays(rays) => {
-            [flat(rays.centers()), rays.center().to_vec(), flat(rays.direction())].concat()
-        }
-        Obfuscation::AxisPlanes(planes) => {
-            planes.axis().iter().copied().chain(bits(planes.offset())).collect()
-        }
-        Obfuscation::AxisCandidates(candidates) => flat(candidates.position()),
-    }
-}
-
-/// Returns every bit of a released map, without descriptors.
-pub fn released_bytes<const D: usize>(released: &Released<D>) -> Vec<u8> {
-    let mut bytes = record_bytes(released.obfuscation());
-    bytes.extend(released.origin().iter().flat_map(|x| x.to_bits().to_le_bytes()));
-    bytes.push(released.slots_per_record() as u8);
-    bytes
+/// Returns the fingerprint of records, which depends on every stored bit.
+pub fn fingerprint<const D: usize>(records: Obfuscation<D>) -> Fingerprint {
+    Released::try_new(records, 1, [0.0; D], Unit::Meter, None).unwrap().fingerprint()
 }
 
 /// Returns every bit of a recovered map.
 pub fn recovered_bytes<const D: usize>(recovered: &Recovered<D>) -> Vec<u8> {
-    let mut bytes = recovered.delta().to_bits().to_le_bytes().to_vec();
+    let bits = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bytes = recovered.delta().to_le_bytes().to_vec();
     bytes.extend(bits(recovered.positions().as_flattened()));
     bytes.extend(recovered.status().iter().map(|&status| status as u8));
     bytes.extend(recovered.support().iter().flat_map(|x| x.to_le_bytes()));

@@ -13,7 +13,9 @@ fn median_error<const D: usize>(
 ) -> f64 {
     let hidden = hide::<D>(entry(scheme), points, 3);
     let options = (solver, RecoverOptions::default());
-    hidden.median_error(&solve(&hidden.released, &hidden.lists(k, 1.0, 3), options))
+    let recovered = solve(&hidden.released, &hidden.lists(k, 1.0, 3), options);
+    let errors = (0..recovered.n_slots()).map(|slot| hidden.error(&recovered, slot));
+    median(&mut errors.collect::<Vec<_>>())
 }
 
 fn errors_fall<const D: usize>(scheme: &str) {

@@ -56,12 +56,10 @@ fn reach_of_partners<const D: usize>(released: &Released<D>) -> f64 {
     }
 }
 
-/// If all neighbors of a slot hide at its original and their records determine a point, recovery
-/// returns it up to rounding.
+/// If all neighbors of a slot hide at its place and determine a point, recovery returns it.
 fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     const COPIES: usize = 16;
-    // In a small map the delta of exchanged coordinates may exceed the distance between piles (85
-    // of 480 are determined in one of 30), so `cp` uses a larger one.
+    // In a small map the delta of exchanged coordinates may exceed the distance between piles.
     let n_piles = if D == 3 && name == "cp" { 90 } else { 30 };
     let hidden = hide::<D>(scheme, &piles(seed, n_piles, COPIES, 0.0), seed);
     let n = hidden.released.n_slots();
@@ -73,9 +71,8 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             let delta = recovered.delta();
             let Some(sine) = fixed_by(&hidden, slot, &lists, 2, delta) else { continue };
             fixed += 1;
-            // `ransac` for candidates first chooses every axis by a vote that may be wrong. No
-            // result is guaranteed if the slot's own axis is wrong or its neighbors leave parallel
-            // lines only. A refit with wrong neighbors is off by up to delta.
+            // `ransac` for candidates first chooses every axis by a vote that may be wrong. A refit
+            // with wrong neighbors is off by up to delta.
             let status = recovered.status()[slot];
             let mut tolerance = 4e-6 / sine;
             if options.0 == Builtin::Ransac
@@ -93,8 +90,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             if options.0 == Builtin::Joint {
                 tolerance = tolerance.max(0.05 * delta);
             }
-            // Otherwise: a few units in the last place at 6 m, divided by the sine of the best
-            // crossing.
+            // Otherwise: a few units in the last place, divided by the sine of the best crossing.
             assert_eq!(status, Status::Ok, "{name}, {options:?}: slot {slot}");
             let off = hidden.error(&recovered, slot);
             assert!(
@@ -103,8 +99,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             );
         }
         // Coincident points share a voxel or region, and so a center: such rays never determine
-        // them. Candidates in a small plane are rarely determined, because chance lies near most
-        // places: 25 of 480 and more.
+        // them. Candidates in a small plane rarely do: 25 of 480 and more.
         let obfuscation = hidden.released.obfuscation();
         let of_places = matches!(obfuscation, Obfuscation::Rays(rays)
             if name == "ray-voxel" || rays.regions().is_some());
@@ -114,8 +109,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
 }
 
-/// Moving one of K agreeing neighbors arbitrarily far does not change the result of the other K - 1
-/// (consensus, fixed delta).
+/// Moving one of K agreeing neighbors arbitrarily far does not change what the others give.
 fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     const PILES: usize = 60;
     const COPIES: usize = 21;
@@ -132,8 +126,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     if let Obfuscation::Rays(rays) = hidden.released.obfuscation()
         && rays.regions().is_some()
     {
-        // Rays that do not cross determine no single point; their ranges come from all bearings
-        // together.
+        // Rays that do not cross determine no single point.
         return;
     }
     let per = hidden.released.slots_per_record();
@@ -168,8 +161,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             replaced[slot] = true;
         }
     }
-    // Both lines of a candidate cross all of the plane, so few pass far away in some draws (45 of
-    // 1,340).
+    // Lines of candidates cross the whole plane, so few pass far away in some draws.
     let least = if D == 2 { n / 100 } else { n / 5 };
     let replacing = replaced.iter().filter(|&&r| r).count();
     assert!(replacing > least, "{name}: {replacing} far records for {n} slots");
@@ -187,6 +179,8 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
 #[test]
 fn neighbors_at_the_original_give_it_back() {
     seeds(3).into_iter().for_each(|seed| over_schemes!(exact_limit, seed));
+    // Regression: a distribution narrower than rounding split a pile.
+    exact_limit::<3>("ppl+", entry("ppl+"), 7_442_521_786_000_528_742);
 }
 
 #[test]
@@ -219,15 +213,7 @@ fn lists_belong_to_a_map() {
     assert!(PointSet::try_new(vec![[0.0, f64::NAN]], Unit::Meter).is_err());
 }
 
-/// Regression: where neighbors coincide, estimates differ by rounding only, and a narrower learned
-/// distribution split a pile.
-#[test]
-fn rounding_is_no_distance() {
-    exact_limit::<3>("ppl+", entry("ppl+"), 7_442_521_786_000_528_742);
-}
-
-/// Exchanged coordinates come back exactly: a slot that takes a coordinate which another slot publishes on that axis gives the other slot
-/// its own. Results are almost the same in another unit.
+/// Exchanged coordinates come back exactly: a slot that takes what another slot publishes gives it its own, also in another unit.
 #[test]
 fn exchanged_coordinates_come_back_exactly_and_from_a_partner() {
     const N: usize = 4000;

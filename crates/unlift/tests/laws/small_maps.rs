@@ -1,7 +1,6 @@
 //! Tests of small maps and of shapes other than rooms.
 //!
-//! Regression: on maps whose lists contain a large part of all records, joint recovery lost what
-//! its first pass, consensus, had found.
+//! Regression: if lists name much of a map, joint recovery lost what consensus had found.
 
 use crate::maps::{audit, *};
 
@@ -20,8 +19,7 @@ fn noisy(center: [f64; 3], sigma: f64, draws: &mut Draws) -> [f64; 3] {
     center.map(|x| x + sigma * draws.normal())
 }
 
-/// Returns the percentages of points within 1.0 and 2.5 typical distances, by joint recovery and by
-/// consensus.
+/// Returns the percentages within 1.0 and 2.5 typical distances, by joint and by consensus.
 fn both(points: &[[f64; 3]], name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
     let typical = median(&mut Knn::new(points).unwrap().kth_distances(50));
     let points = points.iter().map(|p| p.map(|x| x / typical)).collect();
@@ -56,12 +54,8 @@ fn joint_recovery_keeps_what_its_first_pass_found() {
         ("plane", &plane, "plane", 0.3, 1.0),
     ] {
         let (joint, consensus) = both(points, name, ratio);
-        for at in 0..2 {
-            assert!(
-                joint[at] >= consensus[at] - margin,
-                "{what} {name} at {ratio}: joint {joint:?}, consensus {consensus:?}"
-            );
-        }
+        let is_kept = (0..2).all(|at| joint[at] >= consensus[at] - margin);
+        assert!(is_kept, "{what} {name} at {ratio}: joint {joint:?}, consensus {consensus:?}");
     }
 }
 
@@ -72,9 +66,8 @@ fn cp(points: &[[f64; 3]], k: usize, delta: Delta) -> f64 {
     outcome.rows[0].recovered_percent[1]
 }
 
-/// Regression: exchanged coordinates agree exactly with those of their partners at any delta. On a
-/// few hundred points chance led to a tenth of the right delta; in a flat map, which a record's
-/// lines cross completely, wide ones were excluded.
+/// Regression: exchanged coordinates agree with partners at any delta. On a few hundred points
+/// chance led to a tenth of the right one; in a flat map wide ones were excluded.
 #[test]
 fn deltas_of_exchanged_coordinates_do_not_collapse() {
     let flat = shape(|_, draws| {
@@ -89,8 +82,7 @@ fn deltas_of_exchanged_coordinates_do_not_collapse() {
 
 #[test]
 fn automatic_delta_does_not_collapse_where_little_is_right() {
-    // Before the fix chance led to a thousandth of the typical distance, and shares within 2.5 were
-    // 2 and 20 %; now 52 and 54.
+    // Before the fix, shares within 2.5 were 2 and 20 %; now 52 and 54.
     for (name, least) in [("ppl+", 50.2), ("cp", 52.8)] {
         let (joint, consensus) = both(&synthetic::room(1, 1_000).points, name, 0.1);
         let found = joint[1].min(consensus[1]);

@@ -1,5 +1,4 @@
-//! ALIKED: sub-pixel keypoints, and descriptors from sample positions that the network chooses for
-//! each keypoint.
+//! ALIKED: sub-pixel keypoints, and descriptors from positions that the network chooses.
 //!
 //! Source: Zhao et al., "ALIKED: A Lighter Keypoint and Descriptor Extraction Network via
 //! Deformable Transformation", IEEE TIM 2023; the weights are the authors' aliked-n16rot.
@@ -14,8 +13,7 @@ use crate::network::{Network, Tensor};
 
 /// The network halves an image five times.
 const MULTIPLE: usize = 32;
-/// Radius in pixels of the window that determines the sub-pixel position, and in which there is no
-/// other keypoint.
+/// Radius of the window that determines the sub-pixel position and holds no other keypoint.
 const RADIUS: usize = 2;
 /// Softmax temperature of the sub-pixel position; with a smaller one the best score decides more.
 const TEMPERATURE: f32 = 0.1;
@@ -103,8 +101,7 @@ fn describe(network: &Network, levels: &Levels, places: &[[f32; 2]]) -> Result<V
     Ok(descriptors.into_values())
 }
 
-/// Returns the sub-pixel position of a keypoint: the mean of the pixels around it, weighted by the
-/// softmax of their scores.
+/// Returns the mean of the pixels around a keypoint, weighted by the softmax of their scores.
 fn refined(scores: &Scores, [x, y]: [usize; 2]) -> [f32; 2] {
     let side = 2 * RADIUS + 1;
     let around = |at: usize| {
@@ -128,8 +125,7 @@ const DIM: usize = 4 * CHANNELS;
 
 /// The four levels of ALIKED over an image that was padded on all sides.
 ///
-/// Resizing the coarse levels to all pixels would need 512 bytes per pixel, so only requested
-/// pixels are computed.
+/// All pixels would need 512 bytes each, so only requested ones are computed.
 struct Levels {
     /// `(1, 32, height, width)`.
     fine: Tensor,
@@ -152,8 +148,7 @@ impl Levels {
         }
     }
 
-    /// Describes the pixel in column `x` of row `y` by 128 values of length 1; zeros outside the
-    /// image.
+    /// Describes a pixel by 128 values of length 1; zeros outside the image.
     fn pixel(&self, x: isize, y: isize, out: &mut [f32]) {
         let [width, height] = self.size;
         if !(0..width as isize).contains(&x) || !(0..height as isize).contains(&y) {
@@ -172,8 +167,7 @@ impl Levels {
     }
 }
 
-/// Interpolates a coarse level at pixel `(x, y)` of an image of `size`; the corners of both
-/// coincide.
+/// Interpolates a coarse level at a pixel of an image whose corners coincide with its own.
 fn enlarged(level: &Tensor, [x, y]: [usize; 2], size: [usize; 2], out: &mut [f32]) {
     let [rows, columns] = [level.shape()[1], level.shape()[2]];
     let place = |at: usize, small: usize, large: usize| {

@@ -11,11 +11,10 @@ pub(crate) struct Scores {
 
 impl Scores {
     /// Returns the positions `(x, y)` of the maxima that `options` request, the best first, equal
-    /// ones in reading order. None is within `radius` pixels of the image border, and the square of
-    /// this half side around a maximum contains no other one.
+    /// ones in reading order. None is within `radius` pixels of the border or, in x and y, of
+    /// another one.
     ///
-    /// Three passes, as in the code of ALIKED and SuperPoint: each maximum suppresses its
-    /// neighborhood, then the rest may have new maxima.
+    /// Three passes, as in the authors' code: each maximum suppresses its neighborhood, then again.
     pub(crate) fn maxima(&self, radius: usize, options: &Extraction) -> Vec<[usize; 2]> {
         let Self { width, height, ref values } = *self;
         let largest = |map: &[f32]| windows(map, width, radius, f32::max);
@@ -68,8 +67,7 @@ pub(crate) fn corners(x: f32, y: f32) -> [([isize; 2], f32); 4] {
     ]
 }
 
-/// Returns the largest value in the square of `2 * radius + 1` pixels around every pixel of a map
-/// with rows of `width`.
+/// Returns the largest value within `radius` columns and rows of every pixel of a map.
 fn windows<T: Copy>(map: &[T], width: usize, radius: usize, larger: fn(T, T) -> T) -> Vec<T> {
     let mut across = map.to_vec();
     for (row, out) in map.chunks_exact(width).zip(across.chunks_exact_mut(width)) {

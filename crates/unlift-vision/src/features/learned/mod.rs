@@ -15,8 +15,7 @@ pub use superpoint::superpoint;
 /// Features of one image, the best first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LearnedFeatures {
-    /// Positions `(x, y)` in pixels of the original image; the middle of the first pixel is
-    /// `(0, 0)`, as in hloc.
+    /// Positions in pixels of the original image; the middle of the first pixel is `(0, 0)`.
     pub keypoints: Vec<[f32; 2]>,
     /// The network's score of each keypoint, 0 to 1.
     pub scores: Vec<f32>,

@@ -15,8 +15,7 @@ use crate::network::{Network, Tensor};
 const MODEL: &str = "superpoint";
 /// Side of a cell in pixels.
 const CELL: usize = 8;
-/// Radius in pixels around a keypoint without other keypoints; also the width of the border without
-/// keypoints.
+/// Radius in pixels without other keypoints, and width of the border without any.
 const RADIUS: usize = 4;
 
 /// Extracts the features of an image with a network that has the inputs and outputs of SuperPoint.
@@ -69,11 +68,9 @@ fn gray([red, green, blue]: [u8; 3]) -> f32 {
     (0.299 * red + 0.587 * green + 0.114 * blue).round() / 255.0
 }
 
-/// Interpolates the descriptor of a pixel from the four cells around it, and normalizes it to
-/// length 1.
+/// Interpolates the descriptor of a pixel from the four cells around it, to length 1.
 ///
-/// A cell's descriptor is at its middle. Pixels are scaled to cells as in the authors' code, by
-/// slightly less than eight.
+/// A cell's descriptor is at its middle. The scale, slightly less than eight, is the authors'.
 fn describe(coarse: &Tensor, place: [usize; 2], size: [usize; 2], out: &mut [f32]) {
     let dim = out.len();
     let cells = [coarse.shape()[2], coarse.shape()[1]];

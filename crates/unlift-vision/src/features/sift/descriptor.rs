@@ -1,5 +1,4 @@
-//! SIFT descriptors: 4 x 4 histograms of gradient directions around a keypoint, and the 128 bytes
-//! that COLMAP stores.
+//! SIFT descriptors: 4 x 4 histograms of gradient directions, and the bytes that COLMAP stores.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -67,9 +66,7 @@ struct Frame {
 }
 
 impl Frame {
-    /// Returns the range of offsets from the middle, in pixels along a row, that the histograms
-    /// cover, for a row `dy` below the middle. It skips the half of the bounding box that is
-    /// outside.
+    /// Returns the offsets from the middle that the histograms cover in the row `dy` below it.
     #[inline(always)]
     fn covered(self, dy: f64) -> (f64, f64) {
         let half = (CELLS + 1) as f64 / 2.0;
@@ -144,8 +141,7 @@ impl Kernel for Votes<'_> {
 }
 
 impl Block {
-    /// Computes the votes of the pixels from offset `(dx, dy)` on; `across` and `down` are their
-    /// weights.
+    /// Computes the votes of pixels from offset `(dx, dy)` on, by weights `across` and `down`.
     #[inline(always)]
     fn new(
         frame: Frame,

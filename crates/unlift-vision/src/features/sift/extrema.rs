@@ -14,8 +14,7 @@ const MIN_SAMPLE: f32 = (0.8 * MIN_CONTRAST) as f32;
 /// Maximum ratio of principal curvatures; keypoints above it are on edges.
 const MAX_EDGE_RATIO: f64 = 10.0;
 
-/// Three differences of four consecutive levels, computed on demand: subtracting again is cheaper
-/// than memory.
+/// Three differences of four levels, computed on demand: cheaper than memory.
 #[derive(Clone, Copy)]
 pub(crate) struct Differences<'a>(pub(crate) &'a [Plane; 4]);
 
@@ -32,8 +31,7 @@ impl Differences<'_> {
         dispatch(self)
     }
 
-    /// Returns true if the middle difference at `(x, y)` is larger than all 26 neighbors (smaller
-    /// if it is negative).
+    /// Returns true if the middle difference at `(x, y)` is farther from 0 than all 26 neighbors.
     #[inline(always)]
     fn extreme(self, x: usize, y: usize) -> bool {
         let sign = self.at(1, x, y).signum();
@@ -131,8 +129,7 @@ const FAR: f64 = 0.6;
 /// An offset beyond this belongs to another extremum.
 const TOO_FAR: f64 = 1.5;
 
-/// Returns the extremum of the quadratic through the samples around `(x, y)`; `level` is the number
-/// of the middle difference.
+/// Returns the extremum of the quadratic around `(x, y)` in the middle difference, `level`.
 ///
 /// `None` if its contrast is too low, its principal curvatures have too large a ratio or opposite
 /// signs, or it is too far away. Lowe 2004, Sec. 4; moves and limits as VLFeat documents them.
@@ -216,8 +213,8 @@ impl Shape {
         solve(self.curvature, self.slope.map(|slope| -slope)).unwrap_or([0.0; 3])
     }
 
-    /// Returns squared trace over determinant of the curvature in the image: `(r + 1)^2 / r` for a
-    /// ratio `r` of principal curvatures, negative for opposite signs.
+    /// Returns `(r + 1)^2 / r` for a ratio `r` of principal curvatures, negative for opposite
+    /// signs.
     fn roundness(&self) -> f64 {
         let [[xx, xy, _], [_, yy, _], _] = self.curvature;
         (xx + yy) * (xx + yy) / (xx * yy - xy * xy)

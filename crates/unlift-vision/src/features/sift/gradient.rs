@@ -30,9 +30,6 @@ impl Gradients {
 
     /// Computes the missing rows of `rows`.
     pub(crate) fn prepare(&mut self, level: &Plane, rows: Range<usize>) {
-        if self.ready[rows.clone()].iter().all(|&ready| ready) {
-            return;
-        }
         dispatch(Prepare { gradients: self, level, rows });
     }
 }
@@ -95,8 +92,7 @@ fn polar(x: f32, y: f32) -> (f32, f32) {
     let (ax, ay) = (x.abs(), y.abs());
     // A small term gives zero gradients a direction, too.
     let r = (ax - ay) / (ax + ay + 1e-12);
-    // In the quadrant with both positive: 1 eighth at 45 degrees. The cubic ends slightly below
-    // zero.
+    // In the first quadrant: 1 eighth at 45 degrees. The cubic ends slightly below zero.
     let angle = (1.0 + (CUBIC * r * r - LINEAR) * r).max(0.0);
     let angle = if x < 0.0 { 4.0 - angle } else { angle };
     let angle = if y < 0.0 { TURN - angle } else { angle };

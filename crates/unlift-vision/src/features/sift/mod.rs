@@ -54,8 +54,7 @@ pub struct Features {
 /// downsized). The same pixels give the same bytes on any machine, unless they are downsized.
 ///
 /// Source: D. Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004; details
-/// that it leaves open follow the documentation of VLFeat (vlfeat.org) and COLMAP
-/// (colmap.github.io).
+/// that it leaves open follow the documentation of VLFeat and COLMAP.
 pub struct Sift {
     options: Extraction,
     ladder: Ladder,
@@ -115,8 +114,7 @@ impl Sift {
         features
     }
 
-    /// Extracts whole levels, from the coarsest on until they exceed the number of requested
-    /// features.
+    /// Extracts whole levels, from the coarsest until they exceed the requested number.
     fn run(&self, image: &GrayImage, workspace: &mut Workspace) -> Features {
         let max_features = self.options.max_features;
         // Describing is the most expensive step, and a level with most of the requested features is
@@ -143,8 +141,7 @@ impl Sift {
         all
     }
 
-    /// Scans all levels, from the finest; describes those for which `is_wanted(level, n_places)` is
-    /// true.
+    /// Scans all levels, from the finest; describes those that `is_wanted(level, n_places)`.
     fn scan(
         &self,
         image: &GrayImage,
@@ -182,8 +179,7 @@ impl Sift {
     }
 }
 
-/// Computes orientations and descriptors of `places`; a pixel of the octave is `pixel` pixels of
-/// the image.
+/// Computes orientations and descriptors; a pixel of the octave is `pixel` of the image.
 fn describe(places: &[Place], pixel: f64, workspace: &mut Workspace) -> Features {
     let Workspace { octave, gradients, weights } = workspace;
     let level = &octave.levels[1];

@@ -34,8 +34,7 @@ impl Place {
 }
 
 /// Computes Gaussian weights of the columns and of the rows within `radius` pixels of the middle
-/// one: `exp(-d^2 / (2 sigma^2))` for the distance `d` from `place`. Windows are their products, so
-/// no pixel needs an exponential.
+/// one, by the distance from `place`. Windows are their products, so no pixel needs an exponential.
 ///
 /// Quotients of neighboring weights are geometric, so each needs two multiplications.
 pub(crate) fn weigh(place: Place, radius: usize, sigma: f64, weights: &mut [Vec<f32>; 2]) {
@@ -116,8 +115,7 @@ impl Kernel for Votes<'_> {
             let across = &weights[0][low + radius - column..];
             let down = weights[1][y + radius - row];
             for ((&length, &angle), &across) in lengths.iter().zip(angles).zip(across) {
-                // Bin centers are at one half; one is added because bins are stored with offset
-                // one.
+                // Bin centers are at one half, and bins are stored with offset one.
                 let at = angle * (BINS as f32 / TURN) + 0.5;
                 let bin = at as usize;
                 let (part, vote) = (at - bin as f32, length * across * down);

@@ -7,12 +7,10 @@ use crate::features::GrayImage;
 
 /// Values per step of a filter.
 const LANES: usize = 32;
-/// Pixels per step of the other vector loops. As many columns may be read beyond a row, so that
-/// loops need no special case for its end.
+/// Pixels per step of the other vector loops, which may read as many columns beyond a row.
 pub(crate) const BLOCK: usize = 16;
 
-/// Rows of `f32`, each longer than the image is wide. Values beyond `width` are finite but
-/// undefined.
+/// Rows of `f32`, longer than the image is wide, by finite but undefined values.
 #[derive(Default)]
 pub(crate) struct Plane {
     pub(crate) width: usize,
@@ -46,8 +44,7 @@ impl Plane {
         self.values[y * self.stride + x]
     }
 
-    /// Doubles an image by linear interpolation; the last pixel is repeated. Pixel `i` moves to
-    /// `2 i`.
+    /// Doubles an image linearly; the last pixel is repeated. Pixel `i` moves to `2 i`.
     pub(crate) fn double(&mut self, image: &GrayImage) {
         let (width, height) = (image.width(), image.height());
         self.reshape(2 * width, 2 * height);
@@ -103,8 +100,7 @@ fn smooth(taps: &[f32], from: &Plane, to: &mut Plane, line: &mut Vec<f32>) {
     dispatch(Smooth { from, to, line, taps });
 }
 
-/// Filters columns, then rows, one output row at a time, so that intermediate values stay in the
-/// cache.
+/// Filters columns, then rows, one output row at a time, which stays in the cache.
 struct Smooth<'a> {
     from: &'a Plane,
     to: &'a mut Plane,
@@ -207,16 +203,14 @@ impl Ladder {
     }
 }
 
-/// Returns the smoothing at `level`, in pixels of the octave; level 1 is the first one with
-/// keypoints.
+/// Returns the smoothing at `level`, in pixels of the octave; level 1 is the first with keypoints.
 pub(crate) fn sigma(level: f64) -> f64 {
     FIRST * libm::exp2(level / LEVELS as f64)
 }
 
 /// Four consecutive levels of an octave, each smoother than the previous one by the same factor.
 ///
-/// An extremum of the middle difference needs only the three differences between them, so no other
-/// level is in memory. Lowe 2004, Sec. 3.
+/// An extremum of the middle difference needs no other level. Lowe 2004, Sec. 3.
 #[derive(Default)]
 pub(crate) struct Octave {
     pub(crate) levels: [Plane; 4],
@@ -234,8 +228,7 @@ impl Octave {
 
     /// Computes the first four levels of the next octave, after the last step of this one.
     pub(crate) fn next(&mut self, ladder: &Ladder) {
-        // The second level has twice the smoothing of the octave's first level: at half the
-        // resolution it is the first level of the next octave.
+        // At half the resolution, the second level is the first of the next octave.
         let [first, second, ..] = &mut self.levels;
         first.halve(second);
         self.fill(ladder);
