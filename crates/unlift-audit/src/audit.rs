@@ -11,11 +11,11 @@ use unlift_io::atomic::{Access, OutputFile, make_folders, write_file};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::document as report;
 use unlift_report::{
-    Document, Opening, RenderOptions, Scene3d, Shares, gate_lines, render, shares, text_table,
+    Document, Opening, RenderOptions, Shares, gate_lines, render, shares, text_table,
 };
 
 use crate::document::{Attacked, Tried, not_audited};
-use crate::gate::{Gate, check_gates, check_lengths_of_gates, gate_result};
+use crate::gate::{Gate, check_gates, gate_result};
 use crate::maps::Prepared;
 use crate::request::distinct;
 use crate::{Error, Progress, bail};
@@ -59,8 +59,7 @@ impl Audit {
         notes: impl IntoIterator<Item = &'n String>,
         progress: &dyn Progress,
     ) -> Result<(), Error> {
-        check_gates(&self.gates, tried)?;
-        points.map_or(Ok(()), |points| check_lengths_of_gates(points, &self.gates))?;
+        check_gates(&self.gates, tried, points)?;
         notes.into_iter().for_each(|note| progress.say(&format!("note: {note}")));
         Ok(())
     }
@@ -77,7 +76,7 @@ impl Audit {
             let of = gates.iter_mut().filter_map(|gate| gate.of.as_mut());
             of.for_each(|of| of.push_str(&format!(", in a map of {extent}")));
         }
-        let Attacked { document, mut seconds, scene, rendering, .. } = attacked;
+        let Attacked { document, mut seconds, rendering, .. } = attacked;
         let doubts = document.doubts.iter().cloned();
         // Some attacks measure no time per row.
         seconds.rows.resize_with(document.results.len(), Default::default);
@@ -94,7 +93,7 @@ impl Audit {
             run: self.output.record(&seconds),
             ..document
         };
-        Ok(Audited { document, scene, rendering })
+        Ok(Audited { document, rendering })
     }
 }
 
@@ -223,7 +222,6 @@ fn peak_bytes() -> Option<u64> {
 pub struct Audited {
     /// The figures.
     pub document: Document,
-    scene: Option<Scene3d>,
     rendering: RenderOptions,
 }
 
@@ -239,7 +237,7 @@ impl Audited {
     /// Renders the self-contained page.
     pub fn page(&self, share_safe: bool) -> Result<String, Error> {
         let options = RenderOptions { share_safe, ..self.rendering.clone() };
-        Ok(render(&self.document, self.scene.as_ref(), &options)?)
+        Ok(render(&self.document, &options)?)
     }
 
     /// Returns the recovered shares of every scheme, the largest first.

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Seconds, Threshold};
 use unlift::neighbors::Needs;
 use unlift::recover::Delta;
-use unlift_report::{Document, RenderOptions, Scene3d};
+use unlift_report::{Document, RenderOptions};
 
 use crate::request::distinct;
 use crate::sources;
@@ -19,7 +19,6 @@ pub struct Attacked {
     pub seconds: Seconds,
     /// A doubt per row, or none.
     pub doubts: Vec<Option<String>>,
-    pub scene: Option<Scene3d>,
     pub rendering: RenderOptions,
 }
 

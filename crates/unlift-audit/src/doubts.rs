@@ -39,7 +39,6 @@ const SHORT: usize = 5;
 
 pub(crate) struct Doubts {
     pub(crate) of_rows: Vec<Option<String>>,
-    /// All doubts about the audit.
     pub(crate) all: Vec<String>,
     /// Notes of the whole audit: its doubts and others.
     pub(crate) notes: Vec<String>,
@@ -293,7 +292,12 @@ impl Checked {
 /// Returns `input` with the sides of the box around all points but the outer 1 % of each axis.
 pub fn with_sides(input: Input, points: &PointSet<3>) -> Input {
     let bounds = Bounds::quantiles(points.positions(), 0.01);
-    input.with_sides(bounds.map(|bounds| sub(&bounds.high, &bounds.low)), points.unit())
+    let sides = bounds.map(|bounds| sub(&bounds.high, &bounds.low));
+    let longest_side = sides.map(|sides| sides.into_iter().fold(0.0, f64::max));
+    match points.unit() {
+        Unit::Meter => Input { extent_m: sides, longest_side: None, ..input },
+        _ => Input { extent_m: None, longest_side, ..input },
+    }
 }
 
 /// Returns the median distance to the nearest other point.
@@ -456,16 +460,16 @@ pub(crate) fn read_from_file(
     let largest = points.iter().flatten().fold(across(points), |most, x| most.max(x.abs()));
     let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let rounding = (ROUNDING * largest).min(least);
-    let all_points = Knn::new(points).ok();
-    let is_point = |value: &&[f64; 3]| {
-        all_points.as_ref().is_some_and(|all| nearest_to(**value, all) <= rounding)
+    let (all, values) = (Knn::new(points).ok(), published.iter().flatten().copied());
+    let is_within = |at: [f64; 3], of: &Option<Knn<'_, 3>>, threshold: f64| {
+        of.as_ref().is_some_and(|of| nearest_to(at, of) <= threshold)
     };
-    let open: Vec<[f64; 3]> = published.iter().flatten().filter(is_point).copied().collect();
+    let open: Vec<[f64; 3]> = values.filter(|&value| is_within(value, &all, rounding)).collect();
     let open = Knn::new(&open).ok();
     let within = |columns: &[Vec<[f64; 3]>], threshold: f64| {
         let is_near = |&slot: &usize| {
             columns.iter().any(|rows| distance(&rows[slot / slots], point(slot)) <= threshold)
-                || open.as_ref().is_some_and(|open| nearest_to(*point(slot), open) <= threshold)
+                || is_within(*point(slot), &open, threshold)
         };
         (0..secret.n_slots()).filter(is_near).count()
     };
@@ -503,7 +507,8 @@ fn at_fixed_distances<'a>(
     })
 }
 
-fn nearest_to(position: [f64; 3], points: &Knn<'_, 3>) -> f64 {
+/// Returns the distance from a position to the nearest of `points`.
+pub(crate) fn nearest_to(position: [f64; 3], points: &Knn<'_, 3>) -> f64 {
     let mut near = Vec::new();
     points.nearest_to(position, 1, &mut near);
     near.first().map_or(f64::INFINITY, |nearest| nearest.0.sqrt())

@@ -21,6 +21,7 @@ use unlift::audit::{NotAudited, Row, WithInterval};
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
 use unlift::{PointSet, Unit};
+use unlift_report::attack::{AGAIN, AGAIN_GEOMETRY, SEQUENCES, queries};
 use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization, UNPROTECTED};
 
 use crate::document::{Attacked, Tried};
@@ -28,7 +29,7 @@ use crate::doubts::{HOPELESS, nearest, noise, short};
 use crate::{Error, bail, sources};
 
 /// A bound on a figure of an audit.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gate {
     typed: String,
     /// The scheme's name; `None` for all. So for solver, source and inlier ratio.
@@ -43,8 +44,9 @@ pub struct Gate {
     bound_percent: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Figure {
+    #[default]
     Recovered,
     /// The percentage recovered, minus that of an attacker without neighborhoods.
     Gain,
@@ -115,12 +117,8 @@ impl Gate {
         let recovered = row.recovered(label).unwrap_or(unknown);
         let baseline = row.baseline(label).unwrap_or(unknown);
         match self.figure {
-            Figure::Recovered if self.counts_baselines() => {
-                if is_worse(&baseline, &recovered) {
-                    baseline
-                } else {
-                    recovered
-                }
+            Figure::Recovered if self.counts_baselines() && is_worse(&baseline, &recovered) => {
+                baseline
             }
             Figure::Recovered => recovered,
             Figure::Gain => WithInterval {
@@ -152,8 +150,24 @@ impl Gate {
             |what: &str| format!("expected {FORM} (for example ppl@0.5:0.10<=20), found {what}");
         let typed = text.trim();
         let (left, bound) = typed.split_once("<=").ok_or_else(|| form("no <="))?;
+        let bound = |sign: char, expected: &str, fits: fn(&f64) -> bool| {
+            let bound = number(bound.trim().trim_end_matches(sign), expected, fits);
+            bound.map_err(|error| format!("bound: {error}"))
+        };
+        let named = |scheme: &str| (scheme != "all").then(|| scheme.to_owned());
         if let Some((scheme, "localization")) = left.rsplit_once(':') {
-            return localization(typed, scheme.trim(), bound);
+            let scheme = scheme.trim();
+            if scheme.is_empty() || scheme.contains([':', '@']) {
+                return Err(format!("expected SCHEME:localization<=MULTIPLE, found {typed}"));
+            }
+            return Ok(Self {
+                typed: typed.to_owned(),
+                scheme: named(scheme),
+                threshold: f64::INFINITY,
+                figure: Figure::Localization,
+                bound_percent: bound('x', "a multiple above 0", is_positive)?,
+                ..Self::default()
+            });
         }
         let (names, inlier_ratio, rest) = match left.split_once('@') {
             // `sequence@5` is the name of a source.
@@ -174,25 +188,21 @@ impl Gate {
             [threshold, "gain"] => (threshold, Figure::Gain),
             [_, unknown, ..] => return Err(form(&format!(":{unknown} (only :gain is known)"))),
         };
-        let (scheme, named) = names.split_first().ok_or_else(|| form("no scheme"))?;
-        let (solver, source) = qualifiers(named)?;
+        let (scheme, others) = names.split_first().ok_or_else(|| form("no scheme"))?;
+        let (solver, source) = qualifiers(others)?;
         if let (Some(source), Some(ratio)) = (&source, inlier_ratio)
             && source != ORACLE
         {
             let expected = format!("none with neighbors by {source}, whose ratio is measured");
             return Err(format!("inlier ratio: expected {expected}, found @{ratio}"));
         }
+        // Names are checked against the plan later.
         let scheme = match scheme.trim() {
-            "all" => None,
             "" => return Err(form("no scheme")),
-            // Names are checked against the plan later.
-            name => Some(name.to_owned()),
+            name => named(name),
         };
         let threshold = positive(threshold).map_err(|error| format!("threshold: {error}"))?;
-        let bound_percent = match bound.trim().trim_end_matches('%').trim_end().parse::<f64>() {
-            Ok(value) if (0.0..=100.0).contains(&value) => value,
-            _ => return Err(format!("bound: expected 0 to 100 percent, found {bound}")),
-        };
+        let bound_percent = bound('%', "0 to 100 percent", |x| (0.0..=100.0).contains(x))?;
         let typed = typed.to_owned();
         Ok(Self { typed, scheme, solver, source, inlier_ratio, threshold, figure, bound_percent })
     }
@@ -204,31 +214,9 @@ fn is_worse(a: &WithInterval, b: &WithInterval) -> bool {
     !(b.is_nan() || b >= a)
 }
 
-fn localization(typed: &str, scheme: &str, bound: &str) -> Result<Gate, String> {
-    let bound_percent = match bound.trim().trim_end_matches('x').parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => value,
-        _ => return Err(format!("bound: expected a multiple above 0, found {bound}")),
-    };
-    if scheme.is_empty() || scheme.contains([':', '@']) {
-        return Err(format!("expected SCHEME:localization<=MULTIPLE, found {typed}"));
-    }
-    Ok(Gate {
-        typed: typed.to_owned(),
-        scheme: (scheme != "all").then(|| scheme.to_owned()),
-        solver: None,
-        source: None,
-        inlier_ratio: None,
-        threshold: f64::INFINITY,
-        figure: Figure::Localization,
-        bound_percent,
-    })
-}
-
 const ORACLE: &str = "oracle";
 /// The part of a gate that further options change.
 const THRESHOLD: &str = "threshold";
-/// Sources of `audit sequence`, with the number of queries behind an `@`.
-const SEQUENCES: [&str; 3] = ["sequence", "sequence+lists", "tracks"];
 
 /// Counts the names left of `<=`: all parts before the first number. Without a number, all known
 /// names, so that the next part is reported as a wrong threshold.
@@ -246,10 +234,8 @@ fn solver_name(text: &str) -> Option<&'static str> {
 
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
-        name @ (ORACLE | "file" | "again" | "again-geometry") => Some(name.to_owned()),
-        name if name.split_once('@').is_some_and(|(name, _)| SEQUENCES.contains(&name)) => {
-            Some(name.to_owned())
-        }
+        name @ (ORACLE | "file" | AGAIN | AGAIN_GEOMETRY) => Some(name.to_owned()),
+        name if queries(name).is_some() => Some(name.to_owned()),
         name => sources::named(name).ok().map(|named| named.name().to_owned()),
     }
 }
@@ -258,22 +244,20 @@ fn source_name(text: &str) -> Option<String> {
 fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), String> {
     let (mut solver, mut source) = (None, None);
     for name in names {
-        if let Some(name) = solver_name(name) {
-            if let Some(earlier) = solver.replace(name) {
-                return Err(format!("expected one solver, found {earlier} and {name}"));
-            }
+        let (kind, earlier) = if let Some(name) = solver_name(name) {
+            ("solver", solver.replace(name).map(str::to_owned))
         } else if let Some(name) = source_name(name) {
-            if let Some(earlier) = source.replace(name.clone()) {
-                return Err(format!("expected one source, found {earlier} and {name}"));
-            }
+            ("source", source.replace(name))
         } else {
             let solvers = Builtin::ALL.map(|solver| solver.name()).join(", ");
             let sources: Vec<&str> = sources::all().iter().map(|entry| entry.name).collect();
-            let sources = sources.join(", ");
             return Err(format!(
-                "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {sources}), \
-                 found {name}"
+                "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {}), found {name}",
+                sources.join(", ")
             ));
+        };
+        if let Some(earlier) = earlier {
+            return Err(format!("expected one {kind}, found {earlier} and {}", name.trim()));
         }
     }
     Ok((solver, source))
@@ -285,13 +269,17 @@ pub fn number<T: FromStr>(
     expected: &str,
     fits: impl Fn(&T) -> bool,
 ) -> Result<T, String> {
-    let number = text.trim().parse().ok().filter(fits);
-    number.ok_or_else(|| format!("expected {expected}, found {text}"))
+    let text = text.trim();
+    text.parse().ok().filter(fits).ok_or_else(|| format!("expected {expected}, found {text}"))
 }
 
 /// Parses a number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
-    number(text, "a number above 0", |x: &f64| x.is_finite() && *x > 0.0)
+    number(text, "a number above 0", is_positive)
+}
+
+fn is_positive(x: &f64) -> bool {
+    x.is_finite() && *x > 0.0
 }
 
 /// Parses a number from 0 to 1.
@@ -320,8 +308,12 @@ fn in_words(gate: &Gate, figure: f64, row: &Row, label: &str) -> String {
     format!("{}, {attack}, {verb} within {label} {sign}", row.scheme)
 }
 
-/// Reports a gate without rows before the audit runs.
-pub fn check_gates(gates: &[Gate], tried: &Tried) -> Result<(), Error> {
+/// Reports a gate without rows before the audit runs, or one that no attack on the `points` of a map can break, which means nothing.
+pub fn check_gates(
+    gates: &[Gate],
+    tried: &Tried,
+    points: Option<&PointSet<3>>,
+) -> Result<(), Error> {
     for gate in gates {
         let typed = &gate.typed;
         if gate.figure == Figure::Localization && !tried.localizes {
@@ -333,6 +325,17 @@ pub fn check_gates(gates: &[Gate], tried: &Tried) -> Result<(), Error> {
         let error = Error::request(format!("--gate {typed}: {wrong}"));
         let advice = "--scale and --thresholds, which change them";
         return Err(if wrong.starts_with(THRESHOLD) { error.advise(advice) } else { error });
+    }
+    let least = gates.iter().min_by(|a, b| a.threshold.total_cmp(&b.threshold));
+    let Some((gate, points)) = least.zip(points) else { return Ok(()) };
+    let nearest = nearest(points.positions())?;
+    if nearest >= HOPELESS * gate.threshold {
+        bail!(
+            "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
+             no attack could come near",
+            gate.typed,
+            short(nearest / gate.threshold)
+        );
     }
     Ok(())
 }
@@ -348,22 +351,6 @@ fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
     let doubt =
         format!("neighbors by {best}, the best source, were not tried, and no attack is named");
     (all && gate.inlier_ratio.is_none() && tried.lacks_best_source).then_some(doubt)
-}
-
-/// Checks the thresholds of gates: a gate that no attack can break means nothing.
-pub fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
-    let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
-    let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
-    let nearest = nearest(points.positions())?;
-    if nearest >= HOPELESS * gate.threshold {
-        bail!(
-            "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
-             no attack could come near",
-            gate.typed,
-            short(nearest / gate.threshold)
-        );
-    }
-    Ok(())
 }
 
 /// Returns the result of a gate. It fails if something it applies to was not audited, or if a row it applies to has a doubt. A gate

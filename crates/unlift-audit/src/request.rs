@@ -124,13 +124,9 @@ impl Request<3> {
     }
 }
 
-/// The headline threshold in pixels; the nearest given threshold is used.
-const HEADLINE_PX: f64 = 10.0;
-
-/// Returns the index of the headline threshold in `thresholds`.
+/// Returns the index of the headline threshold of images in `thresholds`.
 pub fn headline(thresholds: &[Threshold]) -> usize {
-    let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
-    (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
+    unlift_report::headline(thresholds.iter().map(|threshold| threshold.value))
 }
 
 /// Returns an error if a source of `plan` does not support the descriptors. `place` says where they are expected.

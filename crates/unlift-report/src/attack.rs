@@ -3,89 +3,47 @@
 use crate::document::Row;
 use crate::words;
 
-/// A kind of neighborhoods (lists of neighbors): their source and quality.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Given {
-    /// `oracle`, `file`, or the name of the attacker's source.
-    pub neighbors: String,
-    /// How the oracle chose the wrong neighbors; `None` for other sources.
-    pub oracle_noise: Option<String>,
-    /// Share of right neighbors: as requested for the oracle, measured for other sources.
-    pub inlier_ratio: f64,
-}
-
-/// An attack, as a row of the results names it.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Attack {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The neighborhoods.
-    pub given: Given,
-    /// The solver's name.
-    pub solver: String,
-}
-
 /// What one attack recovers, as the page shows it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByAttack<T> {
-    /// The attack.
-    pub attack: Attack,
+    /// A row that names the attack by its scheme, source, noise, inlier ratio and solver.
+    pub row: Row,
     /// Recovered positions, or a picture painted from them.
     pub recovered: T,
 }
 
-impl Given {
-    /// Returns the neighborhoods of a row.
-    pub fn of(row: &Row) -> Self {
-        Self {
-            neighbors: row.neighbors.clone(),
-            oracle_noise: row.oracle_noise.clone(),
-            inlier_ratio: row.inlier_ratio,
-        }
-    }
+/// Returns whether the lists of neighbors of both rows are one choice on the page. A measured ratio is ignored, because it differs
+/// between schemes, images and repeats.
+pub fn same_lists(a: &Row, b: &Row) -> bool {
+    a.neighbors == b.neighbors
+        && (!is_oracle(&a.neighbors)
+            || (a.inlier_ratio == b.inlier_ratio
+                && noise(&a.oracle_noise) == noise(&b.oracle_noise)))
+}
 
-    /// Returns whether both are one choice on the page. A measured ratio is ignored, because it differs
-    /// between schemes, images and repeats.
-    pub(crate) fn same_choice(&self, other: &Self) -> bool {
-        self.neighbors == other.neighbors
-            && (!is_oracle(&self.neighbors)
-                || (self.inlier_ratio == other.inlier_ratio
-                    && noise(&self.oracle_noise) == noise(&other.oracle_noise)))
-    }
+/// Returns whether both rows are of one attack on one scheme.
+pub(crate) fn is_same(a: &Row, b: &Row) -> bool {
+    a.scheme == b.scheme && a.solver == b.solver && same_lists(a, b)
+}
 
-    /// Returns the name of the source as users type it: `oracle`, `oracle (near)`, `overlap`, `given lists`.
-    pub(crate) fn source(&self) -> String {
-        match (self.neighbors.as_str(), self.oracle_noise.as_deref()) {
-            ("oracle", None | Some("uniform")) => "oracle".to_owned(),
-            ("oracle", Some(noise)) => format!("oracle ({noise})"),
-            ("file", _) => "given lists".to_owned(),
-            (own, _) => own.to_owned(),
-        }
-    }
-
-    pub(crate) fn plain_source(&self) -> String {
-        plain_source(&self.neighbors, self.oracle_noise.as_deref())
-    }
-
-    /// Returns the source and its quality: `known neighbors, 50 % right`.
-    pub(crate) fn label(&self) -> String {
-        format!("{}, {} % right", self.plain_source(), words::ratio_percent(self.inlier_ratio))
+/// Returns the name of a row's source as users type it: `oracle`, `oracle (near)`, `overlap`, `given lists`.
+pub(crate) fn source(row: &Row) -> String {
+    match (row.neighbors.as_str(), noise(&row.oracle_noise)) {
+        ("oracle", "uniform") => "oracle".to_owned(),
+        ("oracle", noise) => format!("oracle ({noise})"),
+        ("file", _) => "given lists".to_owned(),
+        (own, _) => own.to_owned(),
     }
 }
 
-impl Attack {
-    /// Returns the attack of a row.
-    pub fn of(row: &Row) -> Self {
-        let (scheme, solver) = (row.scheme.clone(), row.solver.clone());
-        Self { scheme, given: Given::of(row), solver }
-    }
+/// Returns the source of a row in plain words, for the page.
+pub(crate) fn lists(row: &Row) -> String {
+    plain_source(&row.neighbors, row.oracle_noise.as_deref())
+}
 
-    /// Returns whether `row` has the figures of this attack.
-    pub(crate) fn is_of(&self, row: &Row) -> bool {
-        row.scheme == self.scheme
-            && row.solver == self.solver
-            && self.given.same_choice(&Given::of(row))
-    }
+/// Returns the source of a row and its quality: `known neighbors, 50 % right`.
+pub(crate) fn label(row: &Row) -> String {
+    format!("{}, {} % right", lists(row), words::ratio_percent(row.inlier_ratio))
 }
 
 /// Returns the name of the oracle's noise model; documents of earlier versions have none.
@@ -122,28 +80,33 @@ pub(crate) fn basis(row: &Row) -> Basis {
     Basis::of(&row.neighbors, &row.solver)
 }
 
-/// Sources of a sequence, before the number of queries: links by descriptors, and by true tracks.
-const SEQUENCE: &str = "sequence";
-pub(crate) const SEQUENCE_AND_LISTS: &str = "sequence+lists";
-const TRACKS: &str = "tracks";
+/// Sources of a sequence, before `@` and the number of queries: links by descriptors, these with lists of neighbors within each query,
+/// and links by the true tracks of the model, the oracle.
+pub const SEQUENCES: [&str; 3] = [SEQUENCE, SEQUENCE_AND_LISTS, TRACKS];
+/// Links that the attacker makes from descriptors.
+pub const SEQUENCE: &str = "sequence";
+/// Links from descriptors, combined with lists of neighbors within each query.
+pub const SEQUENCE_AND_LISTS: &str = "sequence+lists";
+/// Links that the tracks of the model give.
+pub const TRACKS: &str = "tracks";
 
 /// The attacker's own sources that use descriptors.
 pub(crate) const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "learned", BEST];
 /// The source that chooses the best of the others for given descriptors.
 pub(crate) const BEST: &str = "descriptors";
 
-/// Sources of two releases: links by descriptors, and by geometry alone.
-pub(crate) const AGAIN: &str = "again";
-const AGAIN_GEOMETRY: &str = "again-geometry";
+/// The source of two releases that are linked by descriptors.
+pub const AGAIN: &str = "again";
+/// The source of two releases that are linked by geometry alone.
+pub const AGAIN_GEOMETRY: &str = "again-geometry";
 
 pub(crate) fn is_again(neighbors: &str) -> bool {
     [AGAIN, AGAIN_GEOMETRY].contains(&neighbors)
 }
 
 /// Returns the source and the number of queries of a row of a sequence: `tracks` and `5` of `tracks@5`.
-pub(crate) fn queries(neighbors: &str) -> Option<(&str, &str)> {
-    let sources = [SEQUENCE, SEQUENCE_AND_LISTS, TRACKS];
-    neighbors.split_once('@').filter(|(by, _)| sources.contains(by))
+pub fn queries(neighbors: &str) -> Option<(&str, &str)> {
+    neighbors.split_once('@').filter(|(by, _)| SEQUENCES.contains(by))
 }
 
 /// Returns whether a row needs no lists of neighbors, because it intersects several releases.
@@ -189,7 +152,7 @@ pub(crate) fn plain_source(neighbors: &str, oracle_noise: Option<&str>) -> Strin
 /// Returns the attack of a row in a few words, for a sentence: `known neighbors`, `records alone`.
 pub(crate) fn briefly(row: &Row) -> String {
     match reads_lists(&row.solver) {
-        true => Given::of(row).plain_source(),
+        true => lists(row),
         false => records_alone(None),
     }
 }
@@ -209,7 +172,7 @@ pub(crate) fn name(row: &Row) -> String {
             let right = words::ratio_percent(row.inlier_ratio);
             format!("{source}, {} listed, {right} % of them right", row.k)
         }
-        Basis::Oracle => Given::of(row).label(),
+        Basis::Oracle => label(row),
     };
     format!("{given}, solver {}", row.solver)
 }
@@ -225,16 +188,19 @@ mod tests {
 
     #[test]
     fn a_measured_ratio_makes_no_other_choice() {
-        let given = |neighbors: &str, noise: Option<&str>, inlier_ratio| Given {
+        let of = |neighbors: &str, noise: Option<&str>, inlier_ratio| Row {
             neighbors: neighbors.into(),
             oracle_noise: noise.map(str::to_owned),
             inlier_ratio,
+            ..Row::default()
         };
-        let oracle = given("oracle", None, 0.5);
-        assert!(given("overlap", None, 0.11).same_choice(&given("overlap", None, 0.12)));
-        assert!(oracle.same_choice(&given("oracle", Some("uniform"), 0.5)));
-        assert!(!oracle.same_choice(&given("oracle", Some("near"), 0.5)));
-        assert!(!oracle.same_choice(&given("oracle", None, 0.3)));
-        assert!(!oracle.same_choice(&given("overlap", None, 0.5)));
+        let oracle = of("oracle", None, 0.5);
+        assert!(same_lists(&of("overlap", None, 0.11), &of("overlap", None, 0.12)));
+        for (noise, ratio, is_same) in
+            [(Some("uniform"), 0.5, true), (Some("near"), 0.5, false), (None, 0.3, false)]
+        {
+            assert_eq!(same_lists(&oracle, &of("oracle", noise, ratio)), is_same);
+        }
+        assert!(!same_lists(&oracle, &of("overlap", None, 0.5)));
     }
 }

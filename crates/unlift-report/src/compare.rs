@@ -6,7 +6,7 @@ use jiff::{Timestamp, tz::TimeZone};
 use serde::Serialize;
 use serde_json::json;
 
-use crate::attack::{self, Attack, Basis, Given};
+use crate::attack::{self, Basis};
 use crate::document::{Document, Error, Input, Localization, Row};
 use crate::results::{Results, distinct};
 use crate::{templates, words};
@@ -139,7 +139,6 @@ const USUAL_TOLERANCE: f64 = 2.0;
 /// Growth of a localization error that counts as the same; random directions change it by some
 /// percent.
 const GROWTH: f64 = 1.1;
-const RECORDS_ALONE: &str = "records alone";
 
 /// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
 /// K and solver. Baselines are compared per scheme.
@@ -156,32 +155,28 @@ pub fn compare(
     accepted: Option<Accepted>,
 ) -> Result<Comparison, Incomparable> {
     let [was, is] = &[old, new].map(Results::of);
-    let within = common_thresholds(was, is)?;
+    let within = &common_thresholds(was, is)?;
     let mut all = Vec::new();
     // Attacks of the new audit alone, beside the strongest of the old one. They count if they recover more.
     let (mut only_new, mut new_attacks) = (Vec::new(), Vec::new());
     let mut taken = vec![false; was.rows.len()];
     for row in is.rows {
-        let attack = Attack::of(row);
-        let is_like =
-            |(before, taken): (&Row, &bool)| !taken && attack.is_of(before) && before.k == row.k;
-        let Some(at) = was.rows.iter().zip(&taken).position(is_like) else {
-            only_new.push(unmatched(row));
-            if attack::basis(row) != Basis::Oracle {
-                let own = |typed: &str| row.recovered_percent.get(typed).copied();
-                new_attacks.extend(beside_strongest(
-                    &within,
-                    was,
-                    (&row.scheme, &attack_of(row)),
-                    own,
-                ));
-            }
-            continue;
+        let of = unmatched(row);
+        let own = |typed: &str| row.recovered_percent.get(typed).copied();
+        let is_like = |(before, taken): (&Row, &bool)| {
+            !taken && attack::is_same(row, before) && before.k == row.k
         };
-        taken[at] = true;
-        let shares = [&was.rows[at], row]
-            .map(|row| move |typed: &str| row.recovered_percent.get(typed).copied());
-        all.extend(changes(&within, &row.scheme, &attack_of(row), shares));
+        if let Some(at) = was.rows.iter().zip(&taken).position(is_like) {
+            taken[at] = true;
+            let before = |typed: &str| was.rows[at].recovered_percent.get(typed).copied();
+            all.extend(changes(within, &of, before, own));
+            continue;
+        }
+        if attack::basis(row) != Basis::Oracle {
+            let strongest = |typed: &str| strongest(was, &row.scheme, typed);
+            new_attacks.extend(changes(within, &of, strongest, own));
+        }
+        only_new.push(of);
     }
     if all.is_empty() {
         return Err(Incomparable {
@@ -193,19 +188,21 @@ pub fn compare(
     let missing = was.rows.iter().zip(&taken).filter(|(_, taken)| !**taken);
     let mut only_old: Vec<Unmatched> = missing.map(|(row, _)| unmatched(row)).collect();
     for &scheme in &is.schemes {
-        let blind = [was, is].map(|of| move |typed: &str| of.blind(scheme, typed));
-        all.extend(changes(&within, scheme, "blind guess", blind));
-        let alone = [was, is].map(|of| move |typed: &str| Some(of.records_alone(scheme, typed)?.0));
-        all.extend(changes(&within, scheme, RECORDS_ALONE, alone));
+        let of = |attack: &str| Unmatched { scheme: scheme.to_owned(), attack: attack.to_owned() };
+        let [before, now] = [was, is].map(|of| move |typed: &str| of.blind(scheme, typed));
+        all.extend(changes(within, &of("blind guess"), before, now));
+        let alone = of("records alone");
+        let [before, now] =
+            [was, is].map(|of| move |typed: &str| Some(of.records_alone(scheme, typed)?.0));
+        all.extend(changes(within, &alone, before, now));
         let has_alone =
             [was, is].map(|of| of.of_scheme(scheme).any(|row| row.records_alone_percent.is_some()));
-        let unmatched = Unmatched { scheme: scheme.to_owned(), attack: RECORDS_ALONE.to_owned() };
         match has_alone {
-            [true, false] => only_old.push(unmatched),
+            [true, false] => only_old.push(alone),
             [false, true] if was.schemes.contains(&scheme) => {
-                let own = |typed: &str| Some(is.records_alone(scheme, typed)?.0);
-                new_attacks.extend(beside_strongest(&within, was, (scheme, RECORDS_ALONE), own));
-                only_new.push(unmatched);
+                let strongest = |typed: &str| strongest(was, scheme, typed);
+                new_attacks.extend(changes(within, &alone, strongest, now));
+                only_new.push(alone);
             }
             _ => {}
         }
@@ -264,32 +261,18 @@ fn strongest(results: &Results<'_>, scheme: &str, typed: &str) -> Option<f64> {
     own.chain(results.blind(scheme, typed)).chain(alone).reduce(f64::max)
 }
 
-/// Returns the changes from the strongest attack of the old audit to one that only the new one has.
-fn beside_strongest(
-    within: &[[&str; 2]],
-    was: &Results<'_>,
-    (scheme, attack): (&str, &str),
-    own: impl Fn(&str) -> Option<f64>,
-) -> Vec<Change> {
-    let shares = [true, false].map(|is_before| {
-        let own = &own;
-        move |typed: &str| if is_before { strongest(was, scheme, typed) } else { own(typed) }
-    });
-    changes(within, scheme, attack, shares)
-}
-
-/// Returns the changes of a figure from the old to the new audit, by pairs of thresholds.
+/// Returns the changes of the figure of an attack from the old to the new audit, by pairs of thresholds.
 fn changes(
     within: &[[&str; 2]],
-    scheme: &str,
-    attack: &str,
-    [was, is]: [impl Fn(&str) -> Option<f64>; 2],
+    of: &Unmatched,
+    was: impl Fn(&str) -> Option<f64>,
+    is: impl Fn(&str) -> Option<f64>,
 ) -> Vec<Change> {
     let change = |[before, after]: &[&str; 2]| {
         let (old_percent, new_percent) = (was(before)?, is(after)?);
         Some(Change {
-            scheme: scheme.to_owned(),
-            attack: attack.to_owned(),
+            scheme: of.scheme.clone(),
+            attack: of.attack.clone(),
             threshold: (*after).to_owned(),
             old_percent,
             new_percent,
@@ -380,18 +363,15 @@ fn common_thresholds<'a>(
     Ok(pairs)
 }
 
-/// Returns the name of a row's attack, without a measured ratio, which differs even between equal audits.
-fn attack_of(row: &Row) -> String {
-    let source = Given::of(row).source();
+/// Returns the scheme and the attack of a row, without a measured ratio, which differs even between equal audits.
+fn unmatched(row: &Row) -> Unmatched {
+    let source = attack::source(row);
     let right = match attack::is_oracle(&row.neighbors) {
         true => format!(", {} % true neighbors", words::ratio_percent(row.inlier_ratio)),
         false => String::new(),
     };
-    format!("{source}{right}, K = {}, {}", row.k, row.solver)
-}
-
-fn unmatched(row: &Row) -> Unmatched {
-    Unmatched { scheme: row.scheme.clone(), attack: attack_of(row) }
+    let attack = format!("{source}{right}, K = {}, {}", row.k, row.solver);
+    Unmatched { scheme: row.scheme.clone(), attack }
 }
 
 /// Returns the schemes of the old audit without a matching row in the new one, and the sources that are no longer audited.

@@ -1,9 +1,9 @@
-//! The results of the user's gates in words.
+//! The results of the user's gates in words, and as JUnit XML.
 
 use serde_json::{Value, json};
 
-use crate::document::{Document, GateResult};
-use crate::words;
+use crate::document::{Document, Error, GateResult};
+use crate::{templates, words};
 
 /// Returns what the page says of gates, the failed ones first; `None` without gates.
 pub(crate) fn gates(document: &Document) -> Option<Value> {
@@ -25,7 +25,7 @@ pub(crate) fn gates(document: &Document) -> Option<Value> {
     Some(json!({ "summary": summary, "passed": failed == 0, "gates": gates }))
 }
 
-pub(crate) fn entry(gate: &GateResult) -> Value {
+fn entry(gate: &GateResult) -> Value {
     json!({ "gate": gate.gate, "passed": gate.passed, "said": in_words(gate) })
 }
 
@@ -37,6 +37,26 @@ pub fn gate_lines(document: &Document) -> String {
         format!("gate {}: {word}, {}\n", gate.gate, briefly(gate))
     };
     document.gates.iter().map(line).collect()
+}
+
+/// Returns the gates of `document` as JUnit XML, the test results that GitLab, Jenkins and others show: one test suite
+/// with a test case per gate. A gate that did not hold is a failure. Unusable images are an error, because gates do
+/// not cover them. The text ends with a line break.
+///
+/// # Errors
+/// [`Error::Template`] if the text cannot be rendered (a bug of this crate).
+pub fn junit(document: &Document) -> Result<String, Error> {
+    let unusable = document.input.images.filter(|images| images.unusable > 0);
+    let values = json!({
+        "suite": document.input.path.as_deref().unwrap_or("unlift audit"),
+        "gates": document.gates.iter().map(entry).collect::<Vec<_>>(),
+        "failures": document.gates.iter().filter(|gate| !gate.passed).count(),
+        "images": unusable,
+        // The schema of Jenkins accepts at most three decimals.
+        "time": format!("{:.3}", document.run.seconds.total.max(0.0)),
+    });
+    let source = include_str!("../template/gates.xml");
+    Ok(templates::render(&[("gates.xml", source)], &values)? + "\n")
 }
 
 /// Returns the reason if a gate failed for another one than the figure, the figure, and its attack.

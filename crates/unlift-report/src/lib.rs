@@ -8,11 +8,11 @@
 //!
 //! let document = Document::from_json(&std::fs::read_to_string("unlift-audit/audit.json")?)?;
 //! print!("{}", text_table(&document));
-//! std::fs::write("report.html", render(&document, None, &RenderOptions::default())?)?;
+//! std::fs::write("report.html", render(&document, &RenderOptions::default())?)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod attack;
+pub mod attack;
 pub mod compare;
 pub mod document;
 pub mod export;
@@ -24,12 +24,13 @@ mod table;
 mod templates;
 mod words;
 
-pub use attack::{Attack, ByAttack, Given};
+pub use attack::{ByAttack, same_lists};
 pub use document::{Document, Error, rounded};
-pub use export::{junit, text_table};
-pub use gates::gate_lines;
+pub use export::text_table;
+pub use gates::{gate_lines, junit};
 pub use page::curves::ErrorCdf;
 pub use page::scene::Scene3d;
 pub use page::{Opening, RenderOptions, Shares, inversions, pictures, render, scene, shares};
 pub use release::leak;
+pub use results::headline;
 pub use words::align;

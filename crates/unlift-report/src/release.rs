@@ -34,18 +34,12 @@ pub fn leak(
         return wrong(place, &format!("{found}, as of this release"), expected);
     }
     let has_rows = |of: &Input| of.other_sha256.contains_key("descriptors");
-    match [audited, input].map(has_rows) {
-        [false, true] => {
-            return wrong("input", "an audit with the descriptors of this release", "one without");
-        }
-        [true, false] => {
-            return wrong(
-                "input",
-                "a release with descriptors, as in the audit",
-                "one without (--descriptors)",
-            );
-        }
-        _ => {}
+    if has_rows(audited) != has_rows(input) {
+        let (expected, found) = match has_rows(input) {
+            true => ("an audit with the descriptors of this release", "one without"),
+            false => ("a release with descriptors, as in the audit", "one without (--descriptors)"),
+        };
+        return wrong("input", expected, found);
     }
     let known = document.options.get("public_descriptors").and_then(Value::as_str);
     if let Some(public) = public.filter(|&public| known != Some(public)) {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use unlift::Unit;
 
-use crate::attack::{self, Basis, Given};
+use crate::attack::{self, Basis};
 use crate::document::{Document, Row};
 use crate::words;
 
@@ -12,6 +12,12 @@ use crate::words;
 const HEADLINE_RATIO: f64 = 0.5;
 /// The headline threshold of images is the one nearest to this one.
 const HEADLINE_PX: f64 = 10.0;
+
+/// Returns the index of the headline threshold of images: of equally near ones the first.
+pub fn headline(thresholds_px: impl Iterator<Item = f64>) -> usize {
+    let away = thresholds_px.map(|value| (value / HEADLINE_PX).ln().abs()).enumerate();
+    away.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(at, _)| at)
+}
 
 /// A document, and what all sections derive from it.
 pub(crate) struct Results<'a> {
@@ -31,14 +37,9 @@ impl<'a> Results<'a> {
         let thresholds = rows.iter().flat_map(|row| row.recovered_percent.keys());
         let thresholds = distinct(thresholds.map(String::as_str));
         let unit = rows.first().map_or(Unit::Meter, |row| row.unit);
-        let away = |typed: &&&str| {
-            typed.parse::<f64>().map_or(f64::INFINITY, |value| (value / HEADLINE_PX).ln().abs())
-        };
-        let headline = match unit {
-            Unit::Pixel => thresholds.iter().min_by(|a, b| away(a).total_cmp(&away(b))),
-            Unit::Meter | Unit::KthNeighbor => thresholds.first(),
-        };
-        let headline = headline.copied().unwrap_or_default();
+        let values = thresholds.iter().map(|typed| typed.parse().unwrap_or(f64::INFINITY));
+        let at = if unit == Unit::Pixel { headline(values) } else { 0 };
+        let headline = thresholds.get(at).copied().unwrap_or_default();
         let schemes = distinct(rows.iter().map(|row| row.scheme.as_str()));
         Self { document, rows, thresholds, headline, schemes, unit }
     }
@@ -140,15 +141,15 @@ impl<'a> Results<'a> {
         })
     }
 
-    /// Returns the row that recovers most of `scheme` within `typed` from these neighborhoods; of equal ones the first.
+    /// Returns the row that recovers most of `scheme` within `typed` from the neighborhoods of `given`; of equal ones the first.
     pub(crate) fn strongest_given(
         &self,
         scheme: &str,
-        given: &Given,
+        given: &Row,
         typed: &str,
     ) -> Option<&'a Row> {
         let share = |row: &Row| row.recovered_percent.get(typed).copied().unwrap_or(-1.0);
-        let rivals = self.of_scheme(scheme).filter(|row| Given::of(row).same_choice(given));
+        let rivals = self.of_scheme(scheme).filter(|row| attack::same_lists(row, given));
         rivals.reduce(|best, row| if share(row) > share(best) { row } else { best })
     }
 
@@ -187,7 +188,6 @@ impl<'a> Results<'a> {
         self.max(scheme, |row| row.blind_percent.get(typed).copied())
     }
 
-    /// Returns the largest figure of a scheme's rows.
     pub(crate) fn max(&self, scheme: &str, of: impl Fn(&Row) -> Option<f64>) -> Option<f64> {
         self.of_scheme(scheme).filter_map(of).max_by(f64::total_cmp)
     }

@@ -21,7 +21,6 @@ pub(crate) struct Head {
     pub class: Class,
 }
 
-/// The layout of a column's cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Class {
@@ -33,7 +32,6 @@ pub(crate) enum Class {
     Prose,
 }
 
-/// A column of a table of items: its head, and the cell of an item.
 pub(crate) struct Column<'a, T> {
     head: Head,
     cell: Box<dyn Fn(&T) -> String + 'a>,
@@ -65,7 +63,6 @@ pub(crate) fn figure<'a, T>(
 pub(crate) const NONE: &str = "–";
 
 impl Table {
-    /// Returns a table with a row per item.
     pub(crate) fn of<'t, T: 't>(
         id: &'static str,
         caption: impl Into<String>,
@@ -97,7 +94,6 @@ impl Table {
         self.columns.iter().map(|head| head.name.clone()).collect()
     }
 
-    /// Returns the table for a terminal.
     pub(crate) fn text(mut self) -> String {
         let is_left = |at: &usize| self.columns[*at].class != Class::Figure;
         let left: Vec<usize> = (0..self.columns.len()).filter(is_left).collect();

@@ -164,15 +164,8 @@ pub(crate) fn ratio_percent(ratio: f64) -> String {
 
 /// Returns a count with thousands grouped: "21,149" for 21149.
 pub(crate) fn thousands(count: impl Display) -> String {
-    let digits = count.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
+    let digits: Vec<char> = count.to_string().chars().collect();
+    digits.rchunks(3).rev().map(String::from_iter).collect::<Vec<_>>().join(",")
 }
 
 /// Returns an ordinal number: "50th" for 50.

@@ -21,22 +21,18 @@ use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift_io::hash::hash_files;
 use unlift_report::Document;
+use unlift_report::attack::{AGAIN, AGAIN_GEOMETRY};
 use unlift_report::document::Input;
 
 use super::frames::doubt_of_frames;
 use super::names;
 use crate::audit::{Audit, Audited};
 use crate::document::{Attacked, Tried};
-use crate::doubts::with_sides;
+use crate::doubts::{nearest_to, with_sides};
 use crate::maps::{self, Preparation, Prepared};
 use crate::{Error, Progress, bail, check_stop};
 
-/// The solver of all rows.
 const SOLVER: &str = "intersection";
-/// Links that the attacker makes from descriptors.
-const AGAIN: &str = "again";
-/// Links that the attacker makes from records alone.
-const GEOMETRY: &str = "again-geometry";
 
 /// The two maps of an audit, in one unit.
 pub struct Maps {
@@ -113,7 +109,7 @@ impl Again<'_> {
     pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
         let (first, second) = (&self.maps.first, self.maps.second());
         let described = first.descriptors.is_some() && second.descriptors.is_some();
-        let sources = if described { &[AGAIN, GEOMETRY][..] } else { &[GEOMETRY] };
+        let sources = if described { &[AGAIN, AGAIN_GEOMETRY][..] } else { &[AGAIN_GEOMETRY] };
         let tried = Tried {
             schemes: self.pairs.iter().map(name).collect(),
             sources: sources.iter().map(|&by| by.to_owned()).collect(),
@@ -219,12 +215,10 @@ fn row(
     let per_record = second_secret.slots_per_record();
     let headline = &plan.thresholds[plan.headline];
     let (mut n_linked, mut n_right, mut n_within) = (0, 0, 0);
-    let mut nearest = Vec::new();
     for (slot, link) in solved.links.iter().enumerate() {
         let Some(record) = link else { continue };
         let point = &points[own.hidden()[slot].index()];
-        knn.nearest_to(*point, 1, &mut nearest);
-        let limit = nearest.first().map_or(f64::INFINITY, |nearest| nearest.0.sqrt());
+        let limit = nearest_to(*point, knn);
         let slots = *record as usize * per_record..(*record as usize + 1) * per_record;
         let away = |hidden: &unlift::OriginalId| distance(&others[hidden.index()], point);
         n_right += usize::from(second_secret.hidden()[slots].iter().any(|at| away(at) <= limit));

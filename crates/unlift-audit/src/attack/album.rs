@@ -6,7 +6,7 @@ use unlift::audit::{Cell, Observer, Row, Watcher};
 use unlift::released::{Obfuscation, Released};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{GRAPH_NEIGHBORS, Graph, Marks, Picture, ReleasedView};
-use unlift_report::{Attack, ByAttack};
+use unlift_report::{ByAttack, same_lists};
 
 use crate::Progress;
 use crate::inversion::Inversion;
@@ -73,18 +73,15 @@ impl Observer<2> for Page<'_> {
         {
             picture.released.push(ReleasedView { scheme: scheme.clone(), marks });
         }
-        let attack = Attack::of(cell.row);
         let first = picture.released.first().is_some_and(|view| view.scheme == *scheme);
-        if first && picture.graphs.iter().all(|graph| graph.given != attack.given) {
+        if first && picture.graphs.iter().all(|graph| !same_lists(&graph.row, cell.row)) {
             let neighbors = slot_of.iter().map(|slot| slot.map_or(Vec::new(), |s| best(cell, s)));
-            picture
-                .graphs
-                .push(Graph { given: attack.given.clone(), neighbors: neighbors.collect() });
+            picture.graphs.push(Graph { row: cell.row.clone(), neighbors: neighbors.collect() });
         }
         let recovered = slot_of.iter().map(|slot| {
             slot.and_then(|slot| cell.recovered.position(slot)).map(|place| narrow(&place))
         });
-        picture.views.push(ByAttack { attack, recovered: recovered.collect() });
+        picture.views.push(ByAttack { row: cell.row.clone(), recovered: recovered.collect() });
     }
 }
 

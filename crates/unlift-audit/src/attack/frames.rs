@@ -5,11 +5,10 @@ use unlift::geometry::vector::{along, cross, distance, dot, median, sub};
 use unlift::seed::{Draws, Stage};
 
 use crate::Error;
-use crate::doubts::short;
+use crate::doubts::{nearest_to, short};
 use crate::localization::matches::{Unit32, mutual};
 use crate::maps::Prepared;
 
-/// Number of points of the first map that are compared.
 const SAMPLE: usize = 500;
 /// Places are equal within the median distance to this neighbor.
 const NEIGHBOR: usize = 10;
@@ -32,12 +31,7 @@ pub fn doubt_of_frames(first: &Prepared, second: &Prepared) -> Result<Option<Str
         _ => Vec::new(),
     };
     if pairs.len() < FEWEST {
-        let mut nearest = Vec::new();
-        let mut is_near = |row: &&usize| {
-            knn.nearest_to(a[**row], 1, &mut nearest);
-            nearest.first().is_some_and(|neighbor| neighbor.0.sqrt() <= near)
-        };
-        let n = rows.iter().filter(&mut is_near).count();
+        let n = rows.iter().filter(|row| nearest_to(a[**row], &knn) <= near).count();
         let message = format!(
             "second map: near {n} of {} points of the first one: in another frame?",
             rows.len()

@@ -16,7 +16,7 @@ use super::curves::OfItems;
 use crate::audit::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
 use crate::images::Opened;
-use crate::images::stream::{Stream, Tally};
+use crate::images::stream::{Tally, stream};
 use crate::inversion::Inversion;
 use crate::{Error, Progress};
 
@@ -48,8 +48,8 @@ impl Images<'_> {
         progress.show(0, chosen.len(), "reading images");
         source.refused.iter().for_each(|line| progress.say(line));
         tally.borrow_mut().unusable += source.refused.len();
-        let stream = Stream::new((source, path), chosen, Some(plan), &tally, progress);
-        let outcome = run_many(stream, plan, &mut watcher)?;
+        let read = stream((source, path), chosen, Some(plan), &tally, progress);
+        let outcome = run_many(read, plan, &mut watcher)?;
         for error in self.inversion.iter().flat_map(|inversion| inversion.failed()) {
             progress.say(&format!("note: not painted: {error}"));
         }
@@ -91,7 +91,6 @@ impl Images<'_> {
             not_audited: outcome.not_audited,
             seconds: outcome.seconds,
             rendering: RenderOptions { error_cdf, pictures, inversions, ..Default::default() },
-            scene: None,
         };
         audit.finish(plan, attacked)
     }
@@ -118,7 +117,7 @@ impl Images<'_> {
         let (inverter, pictures, inversions) = (self.inversion.clone(), Vec::new(), Vec::new());
         let mut album = Album { inverter, steps: progress, pictures, inversions };
         let again = RefCell::default();
-        let images = Stream::new((source, path), &numbers, Some(&self.plan), &again, progress);
+        let images = stream((source, path), &numbers, Some(&self.plan), &again, progress);
         run_many(images, &plan, &mut album)?;
         for picture in &mut album.pictures {
             let at = numbers.iter().position(|&at| source.names[at] == picture.name);

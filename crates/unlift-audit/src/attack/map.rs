@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use unlift::Descriptors;
 use unlift::audit::{Alone, Cell, Observer, Plan, Row, run, run_many, run_released};
 use unlift::geometry::frame::rounded_origin;
 use unlift::released::Released;
-use unlift::truth::{Original, Secret};
+use unlift::truth::Secret;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::{ObfuscationView, SceneBox, points_within_budget, subsample};
-use unlift_report::{Attack, ByAttack, Document, RenderOptions, Scene3d};
+use unlift_report::{ByAttack, Document, RenderOptions, Scene3d};
 
 use super::curves::{Curves, OfItems};
 use super::tiles::{Tiles, figures};
@@ -25,16 +24,10 @@ use crate::{Error, Progress};
 
 /// A map, and how it is attacked.
 pub struct Map<'a> {
-    /// The points, in the unit of the audit.
-    pub original: &'a Original<3>,
-    /// Descriptors, one row per point.
-    pub descriptors: Option<&'a Descriptors>,
-    /// The cameras that observe the points, for localization; not used with tiles.
-    pub localize: Option<Localize<'a>>,
-    /// Camera centers in the unit of the audit, for the 3D view.
-    pub cameras: Vec<[f64; 3]>,
-    /// The up direction of the 3D view, if known.
-    pub up: Option<[f64; 3]>,
+    /// The points, descriptors and cameras.
+    pub prepared: &'a Prepared,
+    /// How localization with the cameras is measured, if it is; not used with tiles.
+    pub localize: Option<Localize>,
     /// The plan of the attack.
     pub plan: Plan<3>,
     /// Makes pictures of recovered points; the plan measures with it, too.
@@ -42,32 +35,11 @@ pub struct Map<'a> {
 }
 
 impl<'a> Map<'a> {
-    /// Returns a map as it was read, with the default plan.
+    /// Returns a map with the default plan.
     pub fn new(prepared: &'a Prepared) -> Self {
-        let (cameras, held_out, protections) = (&prepared.cameras, None, Vec::new());
-        let scale = 1.0 / prepared.unit_in_map_units;
-        let centers = prepared.input.cameras.iter().map(|center| center.map(|x| x * scale));
-        Self {
-            descriptors: prepared.descriptors.as_ref(),
-            localize: Some(Localize { cameras, held_out, protections }),
-            cameras: centers.collect(),
-            up: prepared.input.up,
-            ..Self::of(&prepared.original)
-        }
-    }
-
-    /// Returns points in memory, with the default plan.
-    pub fn of(original: &'a Original<3>) -> Self {
-        let points = original.reveal();
-        Self {
-            original,
-            descriptors: None,
-            localize: None,
-            cameras: Vec::new(),
-            up: None,
-            plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
-            inversion: None,
-        }
+        let points = prepared.original.reveal();
+        let plan = Plan::new(points.unit()).for_map(points.len(), USUAL_K);
+        Self { prepared, localize: Some(Localize::default()), plan, inversion: None }
     }
 }
 
@@ -91,12 +63,14 @@ impl Map<'_> {
         audit: &Audit,
         progress: &dyn Progress,
     ) -> Result<Audited, Error> {
-        let (original, plan, points) = (self.original, &self.plan, self.original.reveal());
+        let Self { prepared, plan, .. } = self;
+        let (original, descriptors) = (&*prepared.original, prepared.descriptors.as_ref());
+        let points = original.reveal();
         let release = hidden.map(|hidden| hidden.release);
         let localize = self.localize.as_ref().filter(|_| tiles.is_none());
         let of_hidden = release.is_some_and(|(released, _)| released.descriptors().is_some());
-        let mut tried = Tried::by(plan, self.descriptors.is_some() || of_hidden);
-        tried.localizes = localize.is_some_and(|localize| !localize.cameras.views.is_empty());
+        let mut tried = Tried::by(plan, descriptors.is_some() || of_hidden);
+        tried.localizes = localize.is_some() && !prepared.cameras.views.is_empty();
         audit.begin(&tried, Some(points), audit.doubts.iter().chain(&audit.notes), progress)?;
         let of_file = |error| match &audit.about.path {
             Some(file) => Error::from(unlift_io::Error::core(file, error)),
@@ -104,10 +78,10 @@ impl Map<'_> {
         };
         // Localization comes first: wrong features are reported before the long attacks.
         let (localization, notes_on_images) = match localize {
-            Some(localize) => localization::of_schemes(localize, original, plan, progress)?,
+            Some(localize) => localization::of_schemes(localize, prepared, plan, progress)?,
             None => Default::default(),
         };
-        let cut = tiles.map(|tiles| tiles.of(points.positions(), self.up)).transpose()?;
+        let cut = tiles.map(|tiles| tiles.of(points.positions(), prepared.input.up)).transpose()?;
         let spread = match &cut {
             Some(tiles) => Spread::of(tiles.iter().map(|tile| tile.points(points)), plan.k),
             None => Spread::of(std::iter::once(Ok(points)), plan.k),
@@ -122,30 +96,36 @@ impl Map<'_> {
                 let mut watcher =
                     OfItems::new(plan, progress, |_, rows| tile_rows.push(rows.to_vec()));
                 progress.show(0, tiles.len(), "splitting the map into tiles");
-                let items = tiles.iter().map(|tile| tile.item(original, self.descriptors));
+                let items = tiles.iter().map(|tile| tile.item(original, descriptors));
                 let outcome = run_many(items, plan, &mut watcher)
                     .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
                 (outcome, watcher.curves)
             }
             None => {
-                let mut watcher = self.watcher(audit.output.share_safe, progress);
-                let of_map = (original, self.descriptors);
+                let inversion = self.inversion.clone();
+                let n_sheets = inversion.as_ref().map_or(0, |by| by.n_photos().min(SHEETS));
+                let draws = !audit.output.share_safe;
+                let mut watcher = Watcher {
+                    progress,
+                    pictures: draws.then(|| Pictures::new(prepared, plan)),
+                    curves: Curves::new(plan, progress),
+                    inversion,
+                    sheets: vec![Sheet::default(); if draws { n_sheets } else { 0 }],
+                    failed: None,
+                };
                 let advice = "a smaller --k, or fewer --schemes";
                 let outcome = match release {
-                    None => run(original, self.descriptors, plan, &mut watcher)
+                    None => run(original, descriptors, plan, &mut watcher)
                         .map_err(|error| of_file(error).advise(advice)),
                     Some(release) => {
-                        run_released(of_map, release, plan, &mut watcher).map_err(of_file)
+                        run_released((original, descriptors), release, plan, &mut watcher)
+                            .map_err(of_file)
                     }
                 }?;
                 if let Some(error) = watcher.failed {
                     return Err(error);
                 }
-                scene = watcher.pictures.map(|Pictures { scene, middle, .. }| Scene3d {
-                    cameras: self.cameras.iter().map(|camera| near(camera, &middle)).collect(),
-                    up: self.up.map(|up| up.map(|x| x as f32)),
-                    ..scene
-                });
+                scene = watcher.pictures.map(|pictures| pictures.scene);
                 inversions = watcher.sheets;
                 (outcome, watcher.curves)
             }
@@ -193,28 +173,12 @@ impl Map<'_> {
             not_audited: outcome.not_audited,
             seconds: outcome.seconds,
             doubts: doubts.of_rows,
-            scene,
-            rendering: RenderOptions { error_cdf, inversions, ..RenderOptions::default() },
+            rendering: RenderOptions { scene, error_cdf, inversions, ..RenderOptions::default() },
         };
         audit.finish(plan, attacked)
     }
-
-    fn watcher<'a>(&self, share_safe: bool, progress: &'a dyn Progress) -> Watcher<'a> {
-        let n_views = self.plan.schemes.len() * self.plan.rows_per_scheme();
-        let inversion = self.inversion.clone();
-        let n_sheets = inversion.as_ref().map_or(0, |inversion| inversion.n_photos().min(SHEETS));
-        Watcher {
-            progress,
-            pictures: (!share_safe).then(|| Pictures::new(self.original, &self.plan, n_views)),
-            curves: Curves::new(&self.plan, progress),
-            inversion,
-            sheets: vec![Sheet::default(); if share_safe { 0 } else { n_sheets }],
-            failed: None,
-        }
-    }
 }
 
-/// Reports progress and collects what the page draws.
 struct Watcher<'a> {
     progress: &'a dyn Progress,
     pictures: Option<Pictures>,
@@ -248,7 +212,6 @@ impl Observer for Watcher<'_> {
     }
 }
 
-/// Points and shapes that are collected while an audit runs.
 struct Pictures {
     sample: Vec<usize>,
     /// The middle of the map. Relative to it `f32` is precise enough, even for georeferenced maps.
@@ -261,15 +224,24 @@ struct Pictures {
 const MAX_SHAPES: usize = 3_000;
 
 impl Pictures {
-    fn new(original: &Original<3>, plan: &Plan<3>, n_views: usize) -> Self {
-        let points = original.reveal().positions();
-        let max_points = points_within_budget(n_views, plan.schemes.len());
+    fn new(prepared: &Prepared, plan: &Plan<3>) -> Self {
+        let points = prepared.original.reveal().positions();
+        let n_schemes = plan.schemes.len();
+        let max_points = points_within_budget(n_schemes * plan.rows_per_scheme(), n_schemes);
         let sample = subsample(points.len(), max_points, plan.seed);
         let middle = rounded_origin(points);
         let originals: Vec<[f32; 3]> =
             sample.iter().map(|&at| near(&points[at], &middle)).collect();
         let bounds = SceneBox::robust(&originals);
-        let scene = Scene3d { originals, n_points: points.len() as u64, ..Scene3d::default() };
+        let scale = 1.0 / prepared.unit_in_map_units;
+        let camera = |center: &[f64; 3]| near(&center.map(|x| x * scale), &middle);
+        let scene = Scene3d {
+            originals,
+            n_points: points.len() as u64,
+            cameras: prepared.input.cameras.iter().map(camera).collect(),
+            up: prepared.input.up.map(|up| up.map(|x| x as f32)),
+            ..Scene3d::default()
+        };
         Self { sample, middle, bounds, scene }
     }
 
@@ -296,7 +268,7 @@ impl Pictures {
             let position = slot_of[at].and_then(|slot| cell.recovered.position(slot));
             position.map_or([f32::NAN; 3], |p| near(&p, &self.middle))
         });
-        let (attack, recovered) = (Attack::of(cell.row), recovered.collect());
-        self.scene.views.push(ByAttack { attack, recovered });
+        let (row, recovered) = (cell.row.clone(), recovered.collect());
+        self.scene.views.push(ByAttack { row, recovered });
     }
 }

@@ -31,21 +31,22 @@ pub(super) fn open(root: &Path, extraction: &Extraction) -> Result<FeatureSource
     let extractor = Extractor::try_new(extraction)?;
     let mut listing = Listing::default();
     listing.visit(root);
-    let others = listing.others();
+    // "12 .heic, 1 .tiff".
+    let others = listing.others.iter().map(|(ending, n)| format!("{n} .{ending}"));
+    let others = others.collect::<Vec<_>>().join(", ");
     if listing.photos.is_empty() {
         return Err(match listing.refused.pop() {
             Some(refused) => refused,
             None => {
-                let found = others.map_or("none".to_owned(), |others| format!("only {others}"));
-                Error::new(root, "", "JPEG, PNG or WebP photos", found)
+                let only = if others.is_empty() { "none" } else { "only " };
+                Error::new(root, "", "JPEG, PNG or WebP photos", format!("{only}{others}"))
             }
         }
         .into());
     }
-    let passed_over = others.map(|others| {
-        let root = root.display();
-        format!("{root}: passed over {others}: only JPEG, PNG and WebP are read")
-    });
+    let root = root.display();
+    let passed_over = format!("{root}: passed over {others}: only JPEG, PNG and WebP are read");
+    let passed_over = (!others.is_empty()).then_some(passed_over);
     listing.photos.sort_unstable();
     let (names, paths) = listing.photos.into_iter().unzip();
     let from = Origin::Photos { paths, extractor, kind: extraction.kind };
@@ -79,13 +80,6 @@ struct Listing {
 }
 
 impl Listing {
-    /// Formats the skipped images: `12 .heic, 1 .tiff`.
-    fn others(&self) -> Option<String> {
-        let others = self.others.iter().map(|(ending, n)| format!("{n} .{ending}"));
-        let others: Vec<String> = others.collect();
-        (!others.is_empty()).then(|| others.join(", "))
-    }
-
     /// Adds the files in `root` and its subfolders, each folder once: links between folders can
     /// create endless paths. Links come after all folders, so that photos have the names of their
     /// own folders, and sorted, so that the result does not depend on the file system.

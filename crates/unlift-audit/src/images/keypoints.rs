@@ -1,4 +1,4 @@
-//! Keypoints and lenses: what is near a place, and where a pinhole camera would see it.
+//! Keypoints and cameras: what is near a place, where a pinhole camera would see it, and sizes.
 
 use unlift::geometry::camera::Intrinsics;
 use unlift::geometry::knn::Knn;
@@ -23,6 +23,13 @@ impl<'a> Nearby<'a> {
         let &(distance2, row) = nearest.first()?;
         (distance2 <= self.radius * self.radius).then_some((distance2, row as usize))
     }
+}
+
+/// Returns what was expected and found if the size of an image is known, and is not that of its camera.
+pub fn other_size(found: Option<[u32; 2]>, camera: [f64; 2]) -> Option<(String, String)> {
+    let [width, height] = found?.map(f64::from);
+    let expected = format!("{} x {} pixels, as its camera in the model", camera[0], camera[1]);
+    ([width, height] != camera).then(|| (expected, format!("{width} x {height}")))
 }
 
 /// Returns where a pinhole camera sees what the lens sees at `place`.

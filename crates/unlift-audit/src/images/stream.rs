@@ -2,7 +2,6 @@
 //! files are reported and skipped.
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -44,17 +43,23 @@ const TELLING: usize = 30;
 const FILLED: f64 = 0.5;
 
 impl Tally {
+    fn add(&mut self, at: usize, ready: Ready) -> Item<2> {
+        let Ready { image, sha256, n_moved, described } = ready;
+        self.fill(&image.original);
+        self.used.push(at);
+        self.sizes.push(image.original.len());
+        self.hashes.extend(sha256);
+        self.n_moved += n_moved;
+        self.described |= described;
+        image
+    }
+
     fn fill(&mut self, original: &Original<2>) {
         let places = original.reveal().positions();
-        let (Some(declared), Some(box_of)) = (
-            original.bounds(),
-            Bounds::quantiles(places, 0.01).filter(|_| places.len() >= TELLING),
-        ) else {
-            return;
-        };
-        let share = |c: usize, x: f64| (x - declared.low[c]) / (declared.high[c] - declared.low[c]);
-        let of = |x: &[f64; 2]| [share(0, x[0]), share(1, x[1])];
-        let (low, high) = (of(&box_of.low), of(&box_of.high));
+        let filled = Bounds::quantiles(places, 0.01).filter(|_| places.len() >= TELLING);
+        let (Some(declared), Some(filled)) = (original.bounds(), filled) else { return };
+        let of = |c: usize, x: f64| (x - declared.low[c]) / (declared.high[c] - declared.low[c]);
+        let [low, high] = [filled.low, filled.high].map(|x| [of(0, x[0]), of(1, x[1])]);
         let all = self.filled.get_or_insert(Bounds { low, high });
         for c in 0..2 {
             all.low[c] = all.low[c].min(low[c]);
@@ -92,73 +97,33 @@ struct Ready {
     described: bool,
 }
 
-/// The images `chosen` of a source. Memory depends on the number of threads, not of images.
-pub struct Stream<'a> {
-    source: &'a FeatureSource,
-    path: &'a Path,
+/// Returns the images `chosen` of a source, in order. Memory depends on the number of threads, not of images.
+///
+/// `path` names the source in errors, which are reported to `steps` and counted in `tally`. Images must have the descriptors that sources
+/// of the `plan` need, and lose those that nothing needs; without a plan, they keep theirs.
+pub fn stream<'a>(
+    (source, path): (&'a FeatureSource, &'a Path),
     chosen: &'a [usize],
     plan: Option<&'a Plan<2>>,
-    next: usize,
-    ready: VecDeque<Result<Item<2>, crate::Error>>,
     tally: &'a RefCell<Tally>,
     steps: &'a dyn Progress,
-}
-
-impl<'a> Stream<'a> {
-    /// Creates a stream. `path` names the source in errors, which are reported to `steps` and
-    /// counted in `tally`. Images must have the descriptors that sources of the `plan` need, and lose those that nothing needs; without
-    /// a plan, they keep theirs.
-    pub fn new(
-        (source, path): (&'a FeatureSource, &'a Path),
-        chosen: &'a [usize],
-        plan: Option<&'a Plan<2>>,
-        tally: &'a RefCell<Tally>,
-        steps: &'a dyn Progress,
-    ) -> Self {
-        let ready = VecDeque::new();
-        Self { source, path, chosen, plan, next: 0, ready, tally, steps }
-    }
-
-    fn read_ahead(&mut self) {
-        let n = PER_THREAD * rayon::current_num_threads();
-        let numbers = &self.chosen[self.next..self.chosen.len().min(self.next + n)];
-        self.next += numbers.len();
-        let (source, path, plan) = (self.source, self.path, self.plan);
+) -> impl Iterator<Item = Result<Item<2>, crate::Error>> + 'a {
+    let blocks = chosen.chunks(PER_THREAD * rayon::current_num_threads());
+    blocks.flat_map(move |block| {
         let read = |&at: &usize| (at, read(source, path, at, plan));
-        let images: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
-        let mut tally = self.tally.borrow_mut();
-        for (at, image) in images {
-            match image {
-                Ok(Ready { image, sha256, n_moved, described }) => {
-                    tally.fill(&image.original);
-                    tally.used.push(at);
-                    tally.sizes.push(image.original.len());
-                    tally.hashes.extend(sha256);
-                    tally.n_moved += n_moved;
-                    tally.described |= described;
-                    self.ready.push_back(Ok(image));
-                }
-                // The caller can correct images in memory, so the error ends the audit.
-                Err(error) if source.is_in_memory() => self.ready.push_back(Err(error)),
-                Err(error) => {
-                    tally.unusable += 1;
-                    self.steps.say(&error.to_string());
-                    self.steps.add(1.0, "");
-                }
+        let images: Vec<_> = block.par_iter().with_max_len(1).map(read).collect();
+        images.into_iter().filter_map(move |(at, image)| match image {
+            Ok(ready) => Some(Ok(tally.borrow_mut().add(at, ready))),
+            // The caller can correct images in memory, so the error ends the audit.
+            Err(error) if source.is_in_memory() => Some(Err(error)),
+            Err(error) => {
+                tally.borrow_mut().unusable += 1;
+                steps.say(&error.to_string());
+                steps.add(1.0, "");
+                None
             }
-        }
-    }
-}
-
-impl Iterator for Stream<'_> {
-    type Item = Result<Item<2>, crate::Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        while self.ready.is_empty() && self.next < self.chosen.len() {
-            self.read_ahead();
-        }
-        self.ready.pop_front()
-    }
+        })
+    })
 }
 
 fn read(

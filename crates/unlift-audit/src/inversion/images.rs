@@ -1,7 +1,6 @@
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
 use unlift::audit::{Cell, Measure, Row};
@@ -13,18 +12,16 @@ use unlift_vision::pictures::{Gallery, Points};
 
 use crate::images::{FeatureSource, evenly};
 
-use super::{Painter, Photo, Picture, needed, size};
+use super::{Painter, Photo, Picture, lock, needed, size};
 
 /// A photo and the picture of its true points: no attack on positions can be expected to do better.
-struct Truth {
-    photo: Photo,
-    baseline: Picture,
-}
+type Truth = (Photo, Picture);
 
 /// Number of photos kept for further cells; fewer images are processed at the same time.
 const KEPT: usize = 64;
 
 /// Makes pictures of images and compares them with the photos.
+#[derive(Debug)]
 pub struct Inversion {
     painter: Painter,
     /// Folder of the photos, which have the names of the images.
@@ -33,12 +30,6 @@ pub struct Inversion {
     gallery: Gallery,
     known: Mutex<BTreeMap<String, Arc<Truth>>>,
     failed: Mutex<BTreeMap<String, Error>>,
-}
-
-impl fmt::Debug for Inversion {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Inversion").field("photos", &self.photos).finish_non_exhaustive()
-    }
 }
 
 impl Inversion {
@@ -78,9 +69,8 @@ impl Inversion {
     /// Adds the picture of `cell` to the sheet of its image.
     pub fn add(&self, cell: &Cell<'_, 2>, sheet: &mut Sheet) -> Result<(), Error> {
         let image = self.painter.image(cell.released, cell.recovered)?;
-        let truth = self.truth(cell)?;
-        let picture = self.painter.compare(image, &truth.photo)?;
-        picture.add_to(sheet, (&truth.photo, &truth.baseline), cell.row)
+        let (photo, baseline) = &*self.truth(cell)?;
+        self.painter.compare(image, photo, None)?.add_to(sheet, (photo, baseline), cell.row)
     }
 
     /// Adds the picture of `recovered` keypoints to the sheet of the image `name`, whose photo has
@@ -93,10 +83,9 @@ impl Inversion {
         row: &Row,
         sheet: &mut Sheet,
     ) -> Result<(), Error> {
-        let truth = self.truth_of(name, size, original)?;
+        let (photo, baseline) = &*self.truth_of(name, size, original)?;
         let image = self.painter.inverter.invert(recovered, size)?;
-        let picture = self.painter.compare(image, &truth.photo)?;
-        picture.add_to(sheet, (&truth.photo, &truth.baseline), row)
+        self.painter.compare(image, photo, None)?.add_to(sheet, (photo, baseline), row)
     }
 
     fn truth(&self, cell: &Cell<'_, 2>) -> Result<Arc<Truth>, Error> {
@@ -124,11 +113,10 @@ impl Inversion {
             let path = path.display().to_string().escape_debug().to_string();
             return Err(Error::new(path, format!("a photo of {expected}"), found));
         }
-        let photo = self.painter.photo(&photo)?;
+        let photo = self.painter.photo(name, &photo)?;
         let image = self.painter.keypoints(places, descriptors, size)?;
-        let baseline = self.painter.compare(image, &photo)?;
-        let baseline = self.painter.assign(baseline, name, &self.gallery)?;
-        let truth = Arc::new(Truth { photo, baseline });
+        let baseline = self.painter.compare(image, &photo, Some(&self.gallery))?;
+        let truth = Arc::new((photo, baseline));
         let mut known = lock(&self.known);
         if known.len() >= KEPT {
             known.clear();
@@ -156,13 +144,8 @@ impl Measure<2> for Inversion {
             }
         };
         let image = self.painter.image(cell.released, cell.recovered)?;
-        let picture = self.painter.compare(image, &truth.photo)?;
-        let picture = self.painter.assign(picture, name, &self.gallery)?;
-        Ok(picture.figures(&truth.baseline, &self.gallery))
+        let (photo, baseline) = &*truth;
+        let picture = self.painter.compare(image, photo, Some(&self.gallery))?;
+        Ok(picture.figures(baseline, &self.gallery))
     }
-}
-
-/// Each entry is complete even if another thread panicked.
-fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
 }

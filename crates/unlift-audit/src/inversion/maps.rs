@@ -1,9 +1,8 @@
 //! Pictures of a map: recovered points as the cameras of its photos see them.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock};
 
 use rayon::prelude::*;
 use unlift::Error;
@@ -14,11 +13,10 @@ use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
-use unlift_vision::features::ColorImage;
 use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::pictures::{Gallery, Lens, View};
 
-use super::{Painter, Photo, Picture, needed};
+use super::{Painter, Photo, Picture, lock, needed};
 use crate::Progress;
 use crate::images::{evenly, kind_of};
 use crate::maps::Prepared;
@@ -27,8 +25,8 @@ use crate::maps::shapes::{near, shapes};
 /// Smallest side of a picture for which the metrics are defined.
 const LEAST_SIDE: usize = 16;
 
+#[derive(Debug)]
 struct PhotoView {
-    name: String,
     view: View,
     photo: Photo,
     /// The picture of the true points.
@@ -36,6 +34,7 @@ struct PhotoView {
 }
 
 /// Makes pictures of a map and compares them with the photos.
+#[derive(Debug)]
 pub struct MapInversion {
     painter: Painter,
     views: Vec<PhotoView>,
@@ -46,12 +45,6 @@ pub struct MapInversion {
     /// The cell that was measured last and its pictures, one per photo, so that the page does not
     /// paint them again.
     last: Mutex<Option<(Row, u32, Vec<Picture>)>>,
-}
-
-impl fmt::Debug for MapInversion {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("MapInversion").field("photos", &self.views.len()).finish_non_exhaustive()
-    }
 }
 
 impl MapInversion {
@@ -101,7 +94,7 @@ impl MapInversion {
             let expected = format!("photos of the images in {}", model.display());
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
-        let small = |of: &PhotoView| (of.name.clone(), Gallery::reduced(&of.photo.image));
+        let small = |of: &PhotoView| (of.photo.name.clone(), Gallery::reduced(&of.photo.image));
         let gallery = Gallery::new(views.iter().take(Gallery::MAX).map(small).collect());
         Ok(Self { painter, views, gallery, ratio: None, last: Mutex::default() })
     }
@@ -132,20 +125,18 @@ impl MapInversion {
         if !self.paints(cell.row) {
             return Ok(());
         }
-        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let pictures = match last {
-            Some((row, repeat, pictures))
-                if repeat == cell.repeat && row.is_same_cell(cell.row) =>
-            {
-                pictures
-            }
-            _ => self.pictures(cell, sheets.len())?,
+        let is_of =
+            |(row, repeat, _): &(Row, u32, _)| *repeat == cell.repeat && row.is_same_cell(cell.row);
+        let last = lock(&self.last).take();
+        let pictures = match last.filter(is_of) {
+            Some((.., pictures)) => pictures,
+            None => self.pictures(cell, sheets.len())?,
         };
         let is_new =
             |sheet: &Sheet| sheet.released.iter().all(|shown| shown.scheme != cell.row.scheme);
         let records = sheets.iter().any(is_new).then(|| records(cell));
         for ((of, sheet), picture) in self.views.iter().zip(sheets).zip(pictures) {
-            sheet.name.clone_from(&of.name);
+            sheet.name.clone_from(&of.photo.name);
             sheet.size = of.view.size.map(|side| side as u32);
             if let Some((shapes, middle)) = &records {
                 let marks = marks(&of.view, shapes, middle)?;
@@ -159,14 +150,9 @@ impl MapInversion {
     fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
         let picture = |of: &PhotoView| {
             let image = self.painter.map(&of.view, cell.released, cell.recovered)?;
-            self.compare(image, of)
+            self.painter.compare(image, &of.photo, Some(&self.gallery))
         };
         self.views.par_iter().take(n).map(picture).collect()
-    }
-
-    fn compare(&self, image: ColorImage, of: &PhotoView) -> Result<Picture, Error> {
-        let picture = self.painter.compare(image, &of.photo)?;
-        self.painter.assign(picture, &of.name, &self.gallery)
     }
 
     fn truth<'a>(&'a self, of: &'a PhotoView, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
@@ -175,7 +161,7 @@ impl MapInversion {
             let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
             let descriptors = needed(cell.descriptors)?;
             let image = self.painter.points(&of.view, &positions, descriptors, |_, _| 1.0)?;
-            self.compare(image, of)
+            self.painter.compare(image, &of.photo, Some(&self.gallery))
         };
         of.truth.get_or_init(make).as_ref().map_err(Error::clone)
     }
@@ -188,17 +174,14 @@ impl Measure<3> for MapInversion {
             return Ok(Vec::new());
         }
         let pictures = self.pictures(cell, self.views.len())?;
-        let mut all = Vec::new();
-        for (of, picture) in self.views.iter().zip(&pictures) {
-            all.extend(picture.figures(self.truth(of, cell)?, &self.gallery));
-        }
         let mut sums = BTreeMap::new();
-        for (name, value) in all {
-            let (sum, n) = sums.entry(name).or_insert((0.0, 0_u32));
-            (*sum, *n) = (*sum + value, *n + 1);
+        for (of, picture) in self.views.iter().zip(&pictures) {
+            for (name, value) in picture.figures(self.truth(of, cell)?, &self.gallery) {
+                let (sum, n) = sums.entry(name).or_insert((0.0, 0_u32));
+                (*sum, *n) = (*sum + value, *n + 1);
+            }
         }
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        *last = Some((cell.row.clone(), cell.repeat, pictures));
+        *lock(&self.last) = Some((cell.row.clone(), cell.repeat, pictures));
         Ok(sums.into_iter().map(|(name, (sum, n))| (name, sum / f64::from(n))).collect())
     }
 }
@@ -269,8 +252,8 @@ fn open_photo(
             let expected = format!("at least {0} x {0} pixels", 2 * LEAST_SIDE);
             return Err(Error::new("size", expected, format!("{width} x {height} pixels")));
         }
-        let name = String::from_utf8_lossy(&image.name).into_owned();
-        Ok(PhotoView { name, view, photo: painter.photo(&photo)?, truth: OnceLock::new() })
+        let name = String::from_utf8_lossy(&image.name);
+        Ok(PhotoView { view, photo: painter.photo(&name, &photo)?, truth: OnceLock::new() })
     };
     open().map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
 }

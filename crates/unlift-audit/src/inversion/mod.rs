@@ -7,13 +7,14 @@ mod maps;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use unlift::audit::Row;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
+use unlift_report::ByAttack;
 use unlift_report::inversions::{Inversion as Sheet, Painted};
-use unlift_report::{Attack, ByAttack};
 use unlift_vision::features::photo::jpeg_of;
 use unlift_vision::features::{ColorImage, halved};
 use unlift_vision::network::DescriptorKind;
@@ -49,6 +50,7 @@ const NEAR: f64 = 0.03;
 
 /// Makes pictures from points and compares them with photos. Every picture has half the size of the
 /// photo, rounded down.
+#[derive(Debug)]
 pub struct Painter {
     inverter: Inverter,
     lpips: Lpips,
@@ -56,7 +58,9 @@ pub struct Painter {
 }
 
 /// A photo at the size of its pictures, and its objects.
+#[derive(Debug)]
 struct Photo {
+    name: String,
     image: ColorImage,
     objects: Vec<Detection>,
 }
@@ -143,12 +147,18 @@ impl Painter {
         self.inverter.invert(&points, view.size)
     }
 
-    fn photo(&self, photo: &ColorImage) -> Result<Photo, Error> {
+    fn photo(&self, name: &str, photo: &ColorImage) -> Result<Photo, Error> {
         let image = halved(photo)?;
-        Ok(Photo { objects: self.detector.find(&image, SURE)?, image })
+        Ok(Photo { name: name.to_owned(), objects: self.detector.find(&image, SURE)?, image })
     }
 
-    fn compare(&self, image: ColorImage, photo: &Photo) -> Result<Picture, Error> {
+    /// Compares a picture with its photo, and finds out whether it is assigned to it among those of a gallery.
+    fn compare(
+        &self,
+        image: ColorImage,
+        photo: &Photo,
+        gallery: Option<&Gallery>,
+    ) -> Result<Picture, Error> {
         let metrics = Metrics::of(&image, &photo.image, &self.lpips)?;
         let found = self.detector.find(&image, SURE)?;
         let again = |object: &Detection| {
@@ -156,13 +166,9 @@ impl Painter {
             (object.class, same.any(|of| of.overlap(object) >= SAME))
         };
         let objects = photo.objects.iter().map(again).collect();
-        Ok(Picture { image, metrics, objects, reidentified: None })
-    }
-
-    /// Finds out whether `picture` is assigned to its photo, `name`, among those of the gallery.
-    fn assign(&self, picture: Picture, name: &str, gallery: &Gallery) -> Result<Picture, Error> {
-        let reidentified = gallery.assigns(&picture.image, name, &self.lpips)?;
-        Ok(Picture { reidentified, ..picture })
+        let assigns = |gallery: &Gallery| gallery.assigns(&image, &photo.name, &self.lpips);
+        let reidentified = gallery.map(assigns).transpose()?.flatten();
+        Ok(Picture { image, metrics, objects, reidentified })
     }
 }
 
@@ -210,9 +216,14 @@ impl Picture {
             sheet.photo = jpeg_of(&photo.image, SHOWN)?;
             sheet.baseline = baseline.painted()?;
         }
-        sheet.views.push(ByAttack { attack: Attack::of(row), recovered: self.painted()? });
+        sheet.views.push(ByAttack { row: row.clone(), recovered: self.painted()? });
         Ok(())
     }
+}
+
+/// Locks what is complete even if another thread panicked.
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn positions(recovered: &Recovered<3>) -> Vec<Option<[f64; 3]>> {

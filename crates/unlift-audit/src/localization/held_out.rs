@@ -20,10 +20,10 @@ use unlift_vision::features::Extraction;
 use unlift_vision::features::photo::Turn;
 use unlift_vision::pictures::Lens;
 
-use super::matches::{Pair, Unit32, mutual, of_protected_keypoints, with_protected_map};
+use super::matches::{Pair, Unit32, mutual, with_protected};
 use crate::Progress;
 use crate::images::FeatureSource;
-use crate::images::keypoints::{Nearby, undistorted};
+use crate::images::keypoints::{Nearby, other_size, undistorted};
 use crate::maps::Cameras;
 
 /// A keypoint belongs to a point that its image observes if it is this near to the projection, in
@@ -92,13 +92,9 @@ impl<'a> Held<'a> {
         let read = |&(at, number): &(usize, usize)| {
             let features = source.get(number)?;
             let view = &cameras.views[at];
-            if let Some(size) = features.size.map(|size| size.map(f64::from))
-                && size != view.size
-            {
-                let of = |[width, height]: [f64; 2]| format!("{width} x {height}");
-                let expected = format!("{} pixels, as its camera in the model", of(view.size));
+            if let Some((expected, found)) = other_size(features.size, view.size) {
                 let place = format!("image {}", features.name.escape_debug());
-                return Ok((at, Err(unlift_io::Error::new(path, place, expected, of(size)))));
+                return Ok((at, Err(unlift_io::Error::new(path, place, expected, found))));
             }
             let camera = &cameras.images[at].1;
             let lens = Lens::try_new(camera.model.name, &camera.params)?;
@@ -237,7 +233,7 @@ impl<'a> Held<'a> {
                 return Ok((free, None));
             };
             let protected = protection.protect(&query.descriptors.plain()?, &key)?;
-            let pairs = of_protected_keypoints(&protected, &map).into_iter();
+            let pairs = with_protected(&map, &protected, true).into_iter();
             Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))
         };
         let hidden = self.queries.par_iter().enumerate().map(hide);
@@ -272,7 +268,7 @@ impl<'a> Held<'a> {
         let of = |query: &Query| {
             let matched = match &compared {
                 Compared::Plain(unit) => mutual(&query.descriptors, unit),
-                Compared::Protected(map) => with_protected_map(&query.descriptors, map),
+                Compared::Protected(map) => with_protected(&query.descriptors, map, false),
             };
             matched.into_iter().map(|(keypoint, at)| (keypoint, rows[at])).collect()
         };

@@ -60,29 +60,23 @@ pub fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
     best.pairs(false)
 }
 
-/// Returns the matches of plain keypoints with a protected map.
-pub fn with_protected_map(keypoints: &Unit32, map: &ProtectedDescriptors) -> Vec<Pair> {
-    let mut best = Best::new(keypoints.len(), map.len());
-    for i in 0..keypoints.len() {
-        let similar = map.similarities(keypoints.row(i)).into_iter().enumerate();
-        similar.for_each(|(j, similar)| best.offer(i, j, similar));
+/// Returns the matches of keypoints with points of a map; `of_keypoints` is true if the keypoints are protected, else the points are.
+pub fn with_protected(
+    plain: &Unit32,
+    protected: &ProtectedDescriptors,
+    of_keypoints: bool,
+) -> Vec<Pair> {
+    let turned = |(a, b)| if of_keypoints { (b, a) } else { (a, b) };
+    let (n_keypoints, n_points) = turned((plain.len(), protected.len()));
+    let mut best = Best::new(n_keypoints, n_points);
+    for row in 0..plain.len() {
+        for (at, similar) in protected.similarities(plain.row(row)).into_iter().enumerate() {
+            let (keypoint, point) = turned((row, at));
+            best.offer(keypoint, point, similar);
+        }
     }
-    best.pairs(has_ties(map))
-}
-
-/// Returns the matches of protected keypoints with a plain map.
-pub fn of_protected_keypoints(keypoints: &ProtectedDescriptors, map: &Unit32) -> Vec<Pair> {
-    let mut best = Best::new(keypoints.len(), map.len());
-    for j in 0..map.len() {
-        let similar = keypoints.similarities(map.row(j)).into_iter().enumerate();
-        similar.for_each(|(i, similar)| best.offer(i, j, similar));
-    }
-    best.pairs(has_ties(keypoints))
-}
-
-/// Sets of words that contain a word are equally similar to it, so the ratio test would reject all.
-fn has_ties(protected: &ProtectedDescriptors) -> bool {
-    matches!(protected.rule(), Rule::Words { .. })
+    // Sets of words that contain a word are equally similar to it, so the ratio test would reject all.
+    best.pairs(matches!(protected.rule(), Rule::Words { .. }))
 }
 
 /// The most similar row of the other side, for the rows of both sides.

@@ -11,17 +11,14 @@ use unlift::geometry::camera::PoseError;
 use unlift::localization::{Localization, View, unprotected, with_map, with_queries};
 use unlift::obfuscate::{Change, Changed, Protection, SCHEMES, Scheme, SchemeOptions, obfuscate};
 use unlift::seed::Key;
-use unlift::truth::Original;
 use unlift_report::document::{self as report, UNPROTECTED};
 
-use crate::maps::Cameras;
+use crate::maps::Prepared;
 use crate::{Error, Progress};
 
 /// Localization in an audit.
-#[derive(Clone, Debug)]
-pub struct Localize<'a> {
-    /// The cameras of the map.
-    pub cameras: &'a Cameras,
+#[derive(Clone, Debug, Default)]
+pub struct Localize {
     /// Photos or features of the images: also localizes held-out images. Every image with an
     /// index that is half of the number modulo the number is held out.
     pub held_out: Option<(PathBuf, usize)>,
@@ -29,7 +26,6 @@ pub struct Localize<'a> {
     pub protections: Vec<Protection>,
 }
 
-/// What a scheme protects.
 #[derive(Clone, Copy)]
 enum Protects<'a> {
     Nothing,
@@ -40,12 +36,13 @@ enum Protects<'a> {
 /// Returns the accuracy under every scheme of `plan` and under every scheme on queries, after that
 /// of the map itself, and notes. Empty without views.
 pub(crate) fn of_schemes(
-    localize: &Localize<'_>,
-    original: &Original<3>,
+    localize: &Localize,
+    prepared: &Prepared,
     plan: &Plan<3>,
     progress: &dyn Progress,
 ) -> Result<(Vec<report::Localization>, Vec<String>), Error> {
-    let views: &[View] = &localize.cameras.views;
+    let Prepared { original, cameras, .. } = prepared;
+    let views: &[View] = &cameras.views;
     if views.is_empty() {
         return Ok(Default::default());
     }
@@ -89,7 +86,7 @@ pub(crate) fn of_schemes(
     }
     let mut notes = Vec::new();
     if let Some((path, nth)) = &localize.held_out {
-        let mut held = held_out::Held::open(path, *nth, localize.cameras, original, progress)?;
+        let mut held = held_out::Held::open(path, *nth, cameras, original, progress)?;
         notes.push(held.note());
         progress.say(&format!("note: {}", held.note()));
         let limits: Vec<(String, f64, f64)> = match original.reveal().unit() {

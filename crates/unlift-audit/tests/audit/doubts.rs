@@ -54,7 +54,7 @@ fn audit(
     plan: Plan<3>,
     gate: &str,
 ) -> Result<Audited, Error> {
-    let map = Map { plan, ..Map::of(&prepared.original) };
+    let map = Map { plan, ..Map::new(prepared) };
     let input = match hidden {
         Some(release) => Input::Released(map, Hidden { release, published: Vec::new() }),
         None => Input::Map(map),
@@ -177,12 +177,12 @@ fn a_unit_that_is_only_stated_is_no_protection() {
 
 #[test]
 fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
-    let points = prepared(&room());
     let said = |gate: &str, plan: Plan<3>, described: bool| {
         let values = (0..N * 8).map(|at| (at * 37 % 101) as u8).collect();
         let descriptors = Descriptors::try_new(Values::U8(values), 8).expect("descriptors");
-        let descriptors = described.then_some(&descriptors);
-        let input = Input::Map(Map { plan, descriptors, ..Map::of(&points.original) });
+        let descriptors = Some(descriptors).filter(|_| described);
+        let points = Prepared { descriptors, ..prepared(&room()) };
+        let input = Input::Map(Map { plan, ..Map::new(&points) });
         let audited = audited(&points, &input, &[gate]).expect("an audit");
         let gate = &audited.document.gates[0];
         assert_eq!(gate.passed, gate.reason.is_none());
@@ -303,7 +303,7 @@ fn a_released_file_that_gives_places_away_is_no_protection() {
         let heights = order.iter().flat_map(|&at| [0.5, 3.0 * places[at as usize][2] as f32]);
         let rows = Descriptors::try_new(Values::F32(heights.collect()), 2).unwrap();
         let release = of_lines((&feet, &directions), order, described.then_some(rows));
-        let map = Map { plan: plan(&["olc"]), ..Map::of(&points.original) };
+        let map = Map { plan: plan(&["olc"]), ..Map::new(&points) };
         let input = Input::Released(map, Hidden { release: &release, published });
         let document = audited(&points, &input, &["olc:joint:0.10<=100"]).unwrap().document;
         let read = document.results[0].records_alone_percent.as_ref().map(|by| by["0.10"]);

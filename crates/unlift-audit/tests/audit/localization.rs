@@ -94,7 +94,7 @@ fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Au
         ..Plan::new(Unit::Meter)
     };
     let held_out = held_out.then(|| (folder.join("features.h5"), 4));
-    let localize = Localize { cameras: &prepared.cameras, held_out, protections: Vec::new() };
+    let localize = Localize { held_out, protections: Vec::new() };
     let map = Map { plan, localize: Some(localize), ..Map::new(&prepared) };
     audited(&prepared, &Input::Map(map), gates).unwrap()
 }

@@ -10,15 +10,24 @@ use unlift::{Error, PointSet, Unit, synthetic};
 
 use crate::schemes;
 
-/// Measures the number of recovered points, and a third of it.
+/// Measures the number of points and of recovered ones, but not of images whose names begin with `none`.
 #[derive(Debug)]
-struct Recovered;
+struct Counts {
+    is_of_images: bool,
+}
 
-impl Measure<3> for Recovered {
-    fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
-        let n = cell.recovered.positions().len();
-        let n = (0..n).filter(|&slot| cell.recovered.position(slot).is_some()).count() as f64;
-        Ok(vec![("recovered".to_owned(), n), ("thirds".to_owned(), n / 3.0)])
+impl<const D: usize> Measure<D> for Counts {
+    fn is_of_images(&self) -> bool {
+        self.is_of_images
+    }
+
+    fn measure(&self, cell: &Cell<'_, D>) -> Result<Vec<(String, f64)>, Error> {
+        if cell.name.is_some_and(|name| name.starts_with("none")) {
+            return Ok(Vec::new());
+        }
+        let recovered = (0..cell.recovered.n_slots()).filter_map(|at| cell.recovered.position(at));
+        let n = [recovered.count(), cell.original.len()].map(|n| n as f64);
+        Ok(vec![("recovered".to_owned(), n[0]), ("size".to_owned(), n[1])])
     }
 }
 
@@ -29,7 +38,7 @@ fn figures_of_a_measure_stand_in_the_rows() {
         inlier_ratios: vec![1.0, 0.1],
         k: 10,
         solvers: vec![Arc::new(Builtin::Joint), Arc::new(Builtin::Ransac)],
-        measures: vec![Arc::new(Recovered)],
+        measures: vec![Arc::new(Counts { is_of_images: false })],
         ..Plan::new(Unit::Meter)
     };
     let points = PointSet::try_new(synthetic::room(1, 400).points, Unit::Meter).unwrap();
@@ -38,30 +47,12 @@ fn figures_of_a_measure_stand_in_the_rows() {
     for row in &rows {
         let n = (row.n_points - row.n_lost) as f64;
         assert!(n > 0.0, "{} {}", row.solver, row.inlier_ratio);
-        let expected = [("recovered", n), ("thirds", n / 3.0)];
+        let expected = [("recovered", n), ("size", 400.0)];
         let metrics = row.metrics.iter().map(|(name, value)| (name.as_str(), *value));
         assert!(metrics.eq(expected), "{:?}, {n}", row.metrics);
     }
     // Rows differ, so a constant would fail.
     assert!(rows.iter().any(|row| row.n_lost != rows[0].n_lost));
-}
-
-/// Measures the number of points of images whose names do not begin with `none`.
-#[derive(Debug)]
-struct Size {
-    is_of_images: bool,
-}
-
-impl Measure<2> for Size {
-    fn is_of_images(&self) -> bool {
-        self.is_of_images
-    }
-
-    fn measure(&self, cell: &Cell<'_, 2>) -> Result<Vec<(String, f64)>, Error> {
-        let named = cell.name.expect("one of many").starts_with("none");
-        let n = cell.original.len() as f64;
-        Ok(if named { Vec::new() } else { vec![("size".to_owned(), n)] })
-    }
 }
 
 /// Returns the mean over images with these names and numbers of points.
@@ -72,7 +63,7 @@ fn size(is_of_images: bool, images: &[(&str, usize)]) -> Option<f64> {
         inlier_ratios: vec![1.0],
         k: 5,
         solvers: vec![Arc::new(Builtin::Consensus)],
-        measures: vec![Arc::new(Size { is_of_images })],
+        measures: vec![Arc::new(Counts { is_of_images })],
         ..usual
     };
     let images = images.iter().map(|&(name, n)| {

@@ -167,7 +167,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
                 bail!("--localize: expected a COLMAP model with cameras and tracks, found none");
             }
             let held_out = Some((path.clone(), args.hold_out.get()));
-            map.localize = Some(Localize { cameras: &prepared.cameras, held_out, protections });
+            map.localize = Some(Localize { held_out, protections });
         }
         let input = match args.tile_points {
             Some(max) => Input::Tiles(map, Tiles { max_points: max.get(), only: None }),
@@ -205,8 +205,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let descriptors = (hidden.0.descriptors(), "in the released map");
         let points = prepared.original.reveal();
         let plan = request.of_map(usual, points, descriptors, &mut audit)?;
-        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
-        let map = Map { plan, descriptors, ..Map::of(original) };
+        let map = Map { plan, ..Map::new(&prepared) };
         let published = published_positions(&args.released)?;
         let input = Input::Released(map, Hidden { release: &hidden, published });
         audit.about = files.about(n_points)?;

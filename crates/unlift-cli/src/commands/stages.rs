@@ -20,7 +20,7 @@ use unlift::truth::{Original, Secret};
 use unlift::{About, OneLine, RowOrder, Unit};
 use unlift_audit::changes::{mitigations, protections_of_map};
 use unlift_audit::images::FeatureSource;
-use unlift_audit::images::stream::{Stream, Tally};
+use unlift_audit::images::stream::{Tally, stream};
 use unlift_audit::released::{expect_slots, same_map};
 use unlift_audit::{Checked, Prepared, Progress as _, bail, check_file, refused};
 use unlift_io::Error as FileError;
@@ -173,7 +173,7 @@ fn obfuscate_images(args: &ObfuscateArgs, mut out: OutputSet) -> crate::Result<(
     tally.borrow_mut().unusable = source.refused.len();
     source.refused.iter().for_each(|line| Stderr.say(line));
     let all: Vec<usize> = (0..source.names.len()).collect();
-    let mut images = Stream::new((&source, path), &all, None, &tally, &Stderr);
+    let mut images = stream((&source, path), &all, None, &tally, &Stderr);
     let mut staged =
         |name, kind, access| OutputFile::create(&out.stage(name, Kind::Stage(kind))?, access);
     let mut truth = staged(TRUTH, Stage::Truth, Access::Private)?;

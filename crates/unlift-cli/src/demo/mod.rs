@@ -13,7 +13,9 @@ use unlift::truth::Original;
 use unlift::{PointSet, Unit, synthetic};
 use unlift_audit::images::{FeatureSource, Opened};
 use unlift_audit::inversion::Inversion;
-use unlift_audit::{Audit, Audited, FIGURES, Images, Input, Map, Output, PAGE, headline, refused};
+use unlift_audit::{
+    Audit, Audited, FIGURES, Images, Input, Map, Output, PAGE, Prepared, headline, refused,
+};
 use unlift_io::atomic::Access;
 use unlift_io::hash::hash_positions;
 use unlift_io::outputs::{Kind, OutputSet, Rules};
@@ -95,27 +97,26 @@ fn map(output: Output) -> crate::Result<Audited> {
     let room = synthetic::room(SEED, N_POINTS);
     let sha256 = hash_positions(&room.points);
     let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
-    let map = Map {
-        cameras: room.cameras.iter().map(|camera| camera.center).collect(),
-        up: Some([0.0, 0.0, 1.0]),
-        plan: Plan {
-            neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Geometric))],
-            inlier_ratios: RATIOS.to_vec(),
-            ..Plan::new(Unit::Meter).for_map(original.len(), 50)
-        },
-        ..Map::of(&original)
+    let mut prepared = Prepared::of(original);
+    prepared.input.cameras = room.cameras.iter().map(|camera| camera.center).collect();
+    prepared.input.up = Some([0.0, 0.0, 1.0]);
+    let map = Map::new(&prepared);
+    let plan = Plan {
+        neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Geometric))],
+        inlier_ratios: RATIOS.to_vec(),
+        ..map.plan.clone()
     };
     let mut audit = Audit::new(output);
     audit.options.insert("room".into(), json!({ "seed": SEED }));
     audit.about = About {
         path: Some("The map of a made-up room".to_owned()),
         sha256: Some(sha256),
-        n_points: original.len() as u64,
+        n_points: prepared.original.len() as u64,
         scale_m_per_unit: Some(1.0),
         unit_in_map_units: Some(1.0),
         ..About::default()
     };
-    audit.run(&Input::Map(map), &Stderr)
+    audit.run(&Input::Map(Map { plan, ..map }), &Stderr)
 }
 
 /// Formats a short summary for users who do not know the schemes.

@@ -10,7 +10,6 @@ mod share;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Number, Value};
-use unlift::Unit;
 pub use unlift::audit::{
     Bound, BreakEven, ByReason, ByThreshold, Distinct, Intervals, NotAudited, ReliabilityBin, Row,
     STRONGEST, Spread,
@@ -95,18 +94,6 @@ pub struct Input {
 }
 
 impl Input {
-    /// Adds the sides of the box around all points but the outer 1 % of each axis, in the unit of the rows.
-    #[must_use]
-    pub fn with_sides(self, sides: Option<[f64; 3]>, unit: Unit) -> Self {
-        let is_metric = unit == Unit::Meter;
-        let longest_side = sides.map(|sides| sides.into_iter().fold(0.0, f64::max));
-        Self {
-            extent_m: sides.filter(|_| is_metric),
-            longest_side: longest_side.filter(|_| !is_metric),
-            ..self
-        }
-    }
-
     /// Returns the size of the map: "15.9 m x 8.2 m x 3.1 m".
     pub fn size(&self) -> Option<String> {
         let sides = self.extent_m?.map(|side| format!("{} m", words::significant(side, 3)));
@@ -307,15 +294,10 @@ impl Document {
     pub fn to_json(&self) -> Result<String, Error> {
         self.check()?;
         let mut value = serde_json::to_value(self)?;
-        for field in ["results", "break_even", "gates", "images", "tiles", "run"] {
-            if let Some(part) = value.get_mut(field) {
-                round_floats(part);
-            }
-        }
-        for field in ["unit_in_map_units", "extent_m", "longest_side"] {
-            if let Some(length) = value.pointer_mut(&format!("/input/{field}")) {
-                round_floats(length);
-            }
+        let lengths = ["input/unit_in_map_units", "input/extent_m", "input/longest_side"];
+        let parts = ["results", "break_even", "gates", "images", "tiles", "run"];
+        for place in parts.into_iter().chain(lengths) {
+            value.pointer_mut(&format!("/{place}")).into_iter().for_each(round_floats);
         }
         let mut text = serde_json::to_string_pretty(&value)?;
         text.push('\n');

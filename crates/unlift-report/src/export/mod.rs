@@ -1,13 +1,11 @@
-//! Figures for papers and for other programs: tables as CSV and LaTeX, gates as JUnit XML, and the table of the terminal.
+//! Figures for papers and for other programs: tables as CSV and LaTeX, and the table of the terminal.
 
-mod junit;
 mod tables;
 mod terminal;
 
 use crate::document::Document;
 use crate::results::Results;
 
-pub use junit::junit;
 pub use tables::{csv, latex};
 pub use terminal::text_table;
 

@@ -1,7 +1,7 @@
 //! Tables for papers and for other programs: every row as CSV (RFC 4180); in LaTeX a row per scheme, and a column per kind of
 //! neighborhoods.
 
-use crate::attack::{self, Given};
+use crate::attack;
 use crate::document::{ByThreshold, Document, Row};
 use crate::page::curves::givens;
 use crate::page::tables::percent_cell;
@@ -45,7 +45,10 @@ pub fn csv(document: &Document, within: &[&str]) -> String {
     }
     columns.push(figure("repeats", |row: &Row| row.repeats.to_string()));
     let table = Table::of("", "", results.rows, columns);
-    [table.heads()].iter().chain(&table.rows).map(|cells| line(cells)).collect()
+    let line = |cells: &Vec<String>| {
+        cells.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",") + "\n"
+    };
+    [table.heads()].iter().chain(&table.rows).map(line).collect()
 }
 
 type Shares = fn(&Row) -> Option<&ByThreshold>;
@@ -69,11 +72,6 @@ const ALWAYS: [(&str, Figure); 7] = [
     ("blind_median_error", |row| row.blind_median_error),
 ];
 
-fn line(cells: &[String]) -> String {
-    let cells: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();
-    cells.join(",") + "\n"
-}
-
 /// Quotes a cell. Text that a spreadsheet would take for a formula gets a leading `'`.
 fn quoted(cell: &str) -> String {
     let is_formula =
@@ -94,7 +92,7 @@ fn grid(results: &Results<'_>, within: &[&str]) -> Table {
     let joined = |cell: &dyn Fn(&str) -> String| {
         within.iter().map(|typed| cell(typed)).collect::<Vec<_>>().join(" / ")
     };
-    let by = |scheme: &str, given: &Given| {
+    let by = |scheme: &str, given: &Row| {
         let row = |typed: &str| results.strongest_given(scheme, given, typed);
         if within.first().is_none_or(|typed| row(typed).is_none()) {
             let refusal = results.refusal(scheme, Some(&given.neighbors));
@@ -119,7 +117,7 @@ fn grid(results: &Results<'_>, within: &[&str]) -> Table {
     columns.extend(
         givens(results)
             .into_iter()
-            .map(|given| figure(head(&given), move |scheme: &&str| by(scheme, &given))),
+            .map(|given| figure(head(given), move |scheme: &&str| by(scheme, given))),
     );
     columns.push(figure("blind", blind));
     if results.rows.iter().any(|row| row.records_alone_percent.is_some()) {
@@ -173,11 +171,11 @@ fn caption(results: &Results<'_>, within: &[&str]) -> String {
 }
 
 /// Returns a short head: `0.5`, `0.5 (near)` or `overlap`.
-fn head(given: &Given) -> String {
-    match given.oracle_noise.as_deref() {
-        _ if !attack::is_oracle(&given.neighbors) => given.source(),
-        None | Some("uniform") => format!("{:?}", given.inlier_ratio),
-        Some(noise) => format!("{:?} ({noise})", given.inlier_ratio),
+fn head(given: &Row) -> String {
+    match attack::noise(&given.oracle_noise) {
+        _ if !attack::is_oracle(&given.neighbors) => attack::source(given),
+        "uniform" => format!("{:?}", given.inlier_ratio),
+        noise => format!("{:?} ({noise})", given.inlier_ratio),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use unlift::Unit;
 
-use crate::attack::{self, Basis, Given};
+use crate::attack::{self, Basis};
 use crate::document::{Bound, Document, NotAudited, Row, STRONGEST};
 use crate::page::cost;
 use crate::page::tables::percent_cell;
@@ -31,7 +31,6 @@ pub fn text_table(document: &Document) -> String {
     format!("{}{extent}\n{reasons}\n\n{figures}", banner.headline)
 }
 
-/// Returns the table of a map or of images, and notes on it.
 fn by_scheme(results: &Results<'_>, cards: &[Card]) -> String {
     let (headline, unit) = (results.headline, unit(results));
     let mut heads = ["scheme", "neighbors by", "true", "solver"].map(str::to_owned).to_vec();
@@ -85,7 +84,6 @@ fn unit(results: &Results<'_>) -> &'static str {
     if results.unit == Unit::KthNeighbor { "x" } else { words::sign(results.unit) }
 }
 
-/// Returns the cells of a row.
 fn of_attack(results: &Results<'_>, row: &Row) -> Vec<String> {
     let share = |typed: &&str| match row.recovered_percent.get(*typed) {
         None => "-".to_owned(),
@@ -94,8 +92,7 @@ fn of_attack(results: &Results<'_>, row: &Row) -> Vec<String> {
             format!("{} %", percent_cell(share, spread))
         }
     };
-    let mut cells =
-        vec![row.scheme.clone(), Given::of(row).source(), right(row), row.solver.clone()];
+    let mut cells = vec![row.scheme.clone(), attack::source(row), right(row), row.solver.clone()];
     cells.extend(results.thresholds.iter().map(share));
     cells.extend([blind(results, row), break_even(results, row)]);
     cells
@@ -185,7 +182,6 @@ fn sequence(results: &Results<'_>) -> String {
         )
 }
 
-/// Returns the table of two releases.
 fn again(results: &Results<'_>) -> String {
     let links = |row: &Row| match row.neighbors.as_str() {
         attack::AGAIN => "descriptors".to_owned(),

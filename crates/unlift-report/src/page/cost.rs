@@ -23,7 +23,6 @@ const LINE: f64 = 11.0;
 const LEAST: f64 = 0.05;
 /// Room for names on the right of the plot.
 const MARGIN: f64 = 50.0;
-/// Size of the chart's plot in its own units.
 const SIZE: [f64; 2] = [560.0, 300.0];
 
 #[derive(Debug, Clone, Serialize)]
@@ -43,7 +42,6 @@ struct Dot {
 }
 
 impl Dot {
-    /// Returns where the name begins and ends.
     fn span(&self) -> [f64; 2] {
         let [x, width] = [self.at[0], LINE + LETTER * self.name.len() as f64];
         if self.is_left { [x - width, x] } else { [x, x + width] }
@@ -56,7 +54,6 @@ impl Dot {
     }
 }
 
-/// A scheme's leak and localization error.
 struct Point<'a> {
     of: &'a Localization,
     leak: f64,

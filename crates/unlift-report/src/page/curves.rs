@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::attack::{self, Basis, Given};
+use crate::attack::{self, Basis};
 use crate::document::{ByThreshold, Row};
 use crate::results::{Results, distinct};
 use crate::words;
@@ -100,17 +100,16 @@ pub(crate) fn page_data(results: &Results<'_>, error_cdf: &[ErrorCdf]) -> Value 
     };
     let rows = results.rows.iter().enumerate().map(|(index, row)| {
         let cdf = error_cdf.iter().find(|cdf| cdf.row == index);
-        let given = Given::of(row);
         let strongest = results.thresholds.iter().map(|typed| {
-            let strongest = results.strongest_given(&row.scheme, &given, typed);
+            let strongest = results.strongest_given(&row.scheme, row, typed);
             strongest.is_some_and(|best| std::ptr::eq(best, row))
         });
         json!({
             // Places in the lists of the choices.
             "scheme": results.schemes.iter().position(|scheme| *scheme == row.scheme),
-            "given": place(&givens, &given),
+            "given": place(&givens, row),
             "solver": solvers.iter().position(|solver| *solver == row.solver),
-            "label": given.label(),
+            "label": attack::label(row),
             "ratio": row.inlier_ratio,
             "strongest": strongest.collect::<Vec<bool>>(),
             "recovered": by_threshold(&row.recovered_percent),
@@ -151,36 +150,35 @@ fn percentile_points(row: &Row) -> Vec<(f64, f64)> {
     points
 }
 
-/// Returns the kinds of neighborhoods of an audit, by falling ratio within a source.
-pub(crate) fn givens(results: &Results<'_>) -> Vec<Given> {
-    let mut givens: Vec<Given> = Vec::new();
-    for given in results.rows.iter().map(Given::of) {
-        if place(&givens, &given).is_none() {
-            givens.push(given);
+/// Returns the first row of each kind of neighborhoods of an audit, by falling ratio within a source.
+pub(crate) fn givens<'a>(results: &Results<'a>) -> Vec<&'a Row> {
+    let mut givens: Vec<&Row> = Vec::new();
+    for row in results.rows {
+        if place(&givens, row).is_none() {
+            givens.push(row);
         }
     }
-    let sources: Vec<String> = givens.iter().map(Given::source).collect();
-    let turn = |given: &Given| sources.iter().position(|source| *source == given.source());
+    let sources: Vec<String> = givens.iter().map(|row| attack::source(row)).collect();
+    let turn = |row: &Row| sources.iter().position(|source| *source == attack::source(row));
     givens.sort_by(|a, b| turn(a).cmp(&turn(b)).then(b.inlier_ratio.total_cmp(&a.inlier_ratio)));
     givens
 }
 
-fn place(givens: &[Given], given: &Given) -> Option<usize> {
-    givens.iter().position(|known| known.same_choice(given))
+fn place(givens: &[&Row], row: &Row) -> Option<usize> {
+    givens.iter().position(|known| attack::same_lists(known, row))
 }
 
-/// Returns an entry of a menu; measured ratios of its rows become a range.
-fn choice(results: &Results<'_>, given: &Given) -> Value {
-    let same = results.rows.iter().filter(|row| Given::of(row).same_choice(given));
+fn choice(results: &Results<'_>, given: &Row) -> Value {
+    let same = results.rows.iter().filter(|row| attack::same_lists(row, given));
     let ratios = same.map(|row| row.inlier_ratio);
     let ends = [ratios.clone().fold(f64::INFINITY, f64::min), ratios.fold(0.0, f64::max)];
     let [low, high] = ends.map(words::ratio_percent);
-    let name = given.plain_source();
+    let name = attack::lists(given);
     let label = match low == high {
-        true => given.label(),
+        true => attack::label(given),
         false => format!("{name}, {low} to {high} % right"),
     };
-    json!({ "label": label, "group": group(&given.neighbors), "source": given.source(), "name": name })
+    json!({ "label": label, "group": group(&given.neighbors), "source": attack::source(given), "name": name })
 }
 
 fn group(neighbors: &str) -> &'static str {
@@ -193,10 +191,10 @@ fn group(neighbors: &str) -> &'static str {
 
 /// Returns the place of the neighborhoods that are shown first: of the attacker's own sources the one that
 /// recovers most; without one, the oracle whose ratio is nearest to half.
-fn first_given(results: &Results<'_>, givens: &[Given]) -> Option<usize> {
+fn first_given(results: &Results<'_>, givens: &[&Row]) -> Option<usize> {
     let own = results.rows.iter().filter(|row| group(&row.neighbors) == "released");
     let oracle = || results.strongest(results.schemes.first()?, Basis::Oracle);
-    place(givens, &Given::of(results.largest(own).or_else(oracle)?))
+    place(givens, results.largest(own).or_else(oracle)?)
 }
 
 fn scheme(results: &Results<'_>, name: &str) -> Value {
@@ -216,7 +214,6 @@ fn scheme(results: &Results<'_>, name: &str) -> Value {
     })
 }
 
-/// Number of colors and marks.
 const SLOTS: usize = 8;
 
 /// Returns the number of the color and mark of `scheme`; unknown schemes are numbered from the last one as they appear.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::attack::{self, Attack, Basis, ByAttack};
+use crate::attack::{self, Basis, ByAttack};
 use crate::document::Row;
 use crate::page::blocks::image_source;
 use crate::page::pictures::{Marks, ReleasedView};
@@ -42,18 +42,14 @@ pub struct Painted {
 type View = ByAttack<Painted>;
 
 impl View {
-    fn basis(&self) -> Basis {
-        Basis::of(&self.attack.given.neighbors, &self.attack.solver)
-    }
-
     fn row<'a>(&self, results: &Results<'a>) -> Option<&'a Row> {
-        results.rows.iter().find(|row| self.attack.is_of(row))
+        results.rows.iter().find(|row| attack::is_same(&self.row, row))
     }
 
     fn shown(&self) -> Shown {
-        let Attack { given, solver, .. } = &self.attack;
+        let solver = &self.row.solver;
         self.recovered.shown(match attack::reads_lists(solver) {
-            true => given.label(),
+            true => attack::label(&self.row),
             false => attack::records_alone(Some(solver)),
         })
     }
@@ -136,19 +132,19 @@ fn strongest<'a>(
     scheme: &str,
     basis: Basis,
 ) -> Option<&'a View> {
-    let is_of = |view: &&View| view.attack.scheme == scheme && view.basis() == basis;
+    let is_of = |view: &&View| view.row.scheme == scheme && attack::basis(&view.row) == basis;
     let views = inversion.views.iter().filter(is_of);
     let row = results.strongest(scheme, basis);
-    let painted = views.clone().find(|view| row.is_some_and(|row| view.attack.is_of(row)));
+    let painted = views.clone().find(|view| row.is_some_and(|row| attack::is_same(&view.row, row)));
     // If the strongest attack was not painted, the best picture stands in.
     painted.or_else(|| views.max_by(|a, b| a.recovered.ssim.total_cmp(&b.recovered.ssim)))
 }
 
 fn sheet(results: &Results<'_>, inversion: &Inversion) -> Sheet {
-    let schemes = distinct(inversion.views.iter().map(|view| view.attack.scheme.as_str()));
+    let schemes = distinct(inversion.views.iter().map(|view| view.row.scheme.as_str()));
     let by_queries = results.is_sequence();
     let rows = schemes.into_iter().map(|scheme| {
-        let views = inversion.views.iter().filter(|view| view.attack.scheme == scheme);
+        let views = inversion.views.iter().filter(|view| view.row.scheme == scheme);
         let strongest = |basis| strongest(results, inversion, scheme, basis);
         let main: Vec<&View> = match by_queries {
             true => views.clone().collect(),
@@ -210,7 +206,7 @@ pub(crate) fn exhibits(results: &Results<'_>, inversions: &[Inversion]) -> Vec<V
     let Some(first) = inversions.first() else { return Vec::new() };
     let mut shown: Vec<(&Inversion, &View)> = Vec::new();
     for inversion in inversions.iter().take(2) {
-        let schemes: Vec<&str> = shown.iter().map(|(_, of)| of.attack.scheme.as_str()).collect();
+        let schemes: Vec<&str> = shown.iter().map(|(_, of)| of.row.scheme.as_str()).collect();
         let best = best(results, inversion, Basis::Released, &schemes);
         shown.extend(best.map(|view| (inversion, view)));
     }
@@ -228,7 +224,7 @@ fn best<'a>(
     without: &[&str],
 ) -> Option<&'a View> {
     let views = inversion.views.iter().filter(|view| {
-        let scheme = view.attack.scheme.as_str();
+        let scheme = view.row.scheme.as_str();
         let strongest = strongest(results, inversion, scheme, basis);
         !without.contains(&scheme) && strongest.is_some_and(|of| std::ptr::eq(of, *view))
     });
@@ -247,8 +243,8 @@ fn kept(inversion: &Inversion, view: &View) -> f64 {
 
 fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<Value> {
     let (level, verdict) = rebuilt(kept(inversion, view));
-    let (row, scheme) = (view.row(results)?, &view.attack.scheme);
-    let from = match view.basis() {
+    let (row, scheme) = (view.row(results)?, &view.row.scheme);
+    let from = match attack::basis(&view.row) {
         Basis::Released => "From the released data alone,".to_owned(),
         Basis::Given => "With given neighbors,".to_owned(),
         Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)) + ":",
@@ -267,8 +263,14 @@ fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<
             " Even from the true points this network paints a poor picture (similarity to the photo: SSIM {baseline:.2} of 1)."
         ));
     }
-    if let Some(assigned) = reidentified(row) {
-        sentence.push_str(&format!(" {assigned}."));
+    let share = |name: &str| row.metrics.get(name).copied();
+    if let Some((assigned, chance)) = share("reidentified").zip(share("reidentified_by_chance"))
+        && chance <= LIKELY_CHANCE
+    {
+        let [assigned, chance] = [assigned, chance].map(|share| words::percent(100.0 * share));
+        sentence.push_str(&format!(
+            " {assigned} % of the pictures by this attack can be assigned to their photo ({chance} % by chance)."
+        ));
     }
     let released = inversion.released.iter().find(|of| of.scheme == *scheme);
     Some(json!({
@@ -284,19 +286,6 @@ fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<
 
 /// With fewer photos than one in this share, a picture is assigned to its photo by chance too often to say anything.
 const LIKELY_CHANCE: f64 = 0.1;
-
-/// Returns how many pictures of a row can be assigned to their photo; `None` if there are few photos.
-fn reidentified(row: &Row) -> Option<String> {
-    let of = |name: &str| row.metrics.get(name).copied();
-    let (share, chance) = (of("reidentified")?, of("reidentified_by_chance")?);
-    if chance > LIKELY_CHANCE {
-        return None;
-    }
-    let [share, chance] = [share, chance].map(|share| words::percent(100.0 * share));
-    Some(format!(
-        "{share} % of the pictures by this attack can be assigned to their photo ({chance} % by chance)"
-    ))
-}
 
 const MAX_LINES: usize = 700;
 const MAX_POINTS: usize = 4_000;

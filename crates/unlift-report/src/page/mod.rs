@@ -64,22 +64,19 @@ const SCRIPTS: [&str; 8] = [
 ///
 /// [`Error::Invalid`] or [`Error::Schema`] when the document breaks a rule of its format,
 /// [`Error::Template`] when the page cannot be rendered (a bug of this crate).
-pub fn render(
-    document: &Document,
-    scene: Option<&Scene3d>,
-    options: &RenderOptions,
-) -> Result<String, Error> {
+pub fn render(document: &Document, options: &RenderOptions) -> Result<String, Error> {
     document.check()?;
     let safe = options.share_safe;
     let document = if safe { document.share_safe() } else { document.clone() };
     let results = &Results::of(&document);
     // A share-safe page draws nothing of the input.
     let nothing = RenderOptions::default();
-    let (scene, private) = if safe { (None, &nothing) } else { (scene, options) };
-    let RenderOptions { pictures, inversions, opening, .. } = private;
+    let private = if safe { &nothing } else { options };
+    let RenderOptions { scene, pictures, inversions, opening, .. } = private;
     let mut blocks = Blocks::default();
     let error_unit = results.thresholds.first().and_then(|typed| typed.parse().ok());
     let error_unit = error_unit.unwrap_or(1.0);
+    let scene = scene.as_ref();
     let scene = scene.and_then(|scene| scene::encode(scene, results.rows, error_unit, &mut blocks));
     let within = results.headline.parse().unwrap_or(10.0);
     let encoded = pictures::encode(pictures, within, &mut blocks);
@@ -113,8 +110,8 @@ pub fn render(
         "style": STYLE,
         "bundle": BUNDLE,
         "scripts": SCRIPTS,
-        // JSON for the script; free of `<`.
-        "data": script_text(&data.to_string()),
+        // JSON that can be inside a script element, because it contains no `<`.
+        "data": data.to_string().replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"),
         "blocks": blocks.0,
         "pictures": !pictures.is_empty(),
         "findings": curves::findings(results),
@@ -152,7 +149,6 @@ fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Returns what the page says of the audited input.
 fn subject(results: &Results<'_>) -> Value {
     let input = &results.document.input;
     // The oracle uses the K of the audit; other sources choose their own.
@@ -186,7 +182,6 @@ fn short_name(path: &str) -> String {
     name.unwrap_or(path).to_owned()
 }
 
-/// Returns the value of an option as text.
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
@@ -196,16 +191,13 @@ fn plain(value: &Value) -> String {
     }
 }
 
-/// Returns JSON that can be inside a script element, because it contains no `<`.
-fn script_text(json: &str) -> String {
-    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
-}
-
 /// Options of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RenderOptions {
     /// Leaves out everything but figures: no points, paths, names, command line.
     pub share_safe: bool,
+    /// The 3D view of a map.
+    pub scene: Option<Scene3d>,
     /// Error curves finer than the percentiles of the document; may be empty.
     pub error_cdf: Vec<ErrorCdf>,
     /// Images to draw, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES); empty for maps.

@@ -5,7 +5,8 @@
 
 use serde_json::{Value, json};
 
-use crate::attack::{self, ByAttack, Given};
+use crate::attack::{self, ByAttack};
+use crate::document::Row;
 use crate::page::blocks::{Blocks, NOT_DRAWN, coordinate};
 use crate::page::scene::subsample;
 use crate::words;
@@ -63,8 +64,8 @@ pub type View = ByAttack<Vec<Option<[f32; 2]>>>;
 /// A graph of neighborhoods: per keypoint up to [`GRAPH_NEIGHBORS`] neighbors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Graph {
-    /// The neighborhoods.
-    pub given: Given,
+    /// A row with these neighborhoods.
+    pub row: Row,
     /// True positions of the neighbors, per keypoint of [`Picture::keypoints`].
     pub neighbors: Vec<Vec<[f32; 2]>>,
 }
@@ -77,9 +78,9 @@ const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
 /// most of the first picture.
 pub(crate) fn first_choice(pictures: &[Picture], within: f64) -> Option<String> {
     let first = pictures.first()?;
-    let own = first.views.iter().filter(|view| !attack::is_oracle(&view.attack.given.neighbors));
+    let own = first.views.iter().filter(|view| !attack::is_oracle(&view.row.neighbors));
     let share = |view: &View| recovered(first, view, within).0;
-    own.max_by(|a, b| share(a).total_cmp(&share(b))).map(|view| key(&view.attack.given))
+    own.max_by(|a, b| share(a).total_cmp(&share(b))).map(|view| key(&view.row))
 }
 
 /// Edges below this fraction of the smaller side are short, as in the paper's figures.
@@ -119,11 +120,11 @@ fn encode_picture(picture: &Picture, budget: usize, within: f64, blocks: &mut Bl
     let released: Vec<Value> = released.collect();
     let views = picture.views.iter().map(|view| {
         json!({
-            "scheme": view.attack.scheme,
+            "scheme": view.row.scheme,
             // The key of the neighborhoods, equal in all pictures.
-            "given": key(&view.attack.given),
-            "label": view.attack.given.label(),
-            "solver": view.attack.solver,
+            "given": key(&view.row),
+            "label": attack::label(&view.row),
+            "solver": view.row.solver,
             "block": push(&|i| vec![at(&view.recovered, i)]),
             "said": recovered(picture, view, within).1,
         })
@@ -136,7 +137,7 @@ fn encode_picture(picture: &Picture, budget: usize, within: f64, blocks: &mut Bl
             (0..GRAPH_NEIGHBORS).map(|rank| of.get(rank).copied()).collect()
         };
         let text = edges(picture, graph, short_px);
-        json!({ "given": key(&graph.given), "said": text, "k": GRAPH_NEIGHBORS, "block": push(&listed) })
+        json!({ "given": key(&graph.row), "said": text, "k": GRAPH_NEIGHBORS, "block": push(&listed) })
     });
     let graphs: Vec<Value> = graphs.collect();
     let n = picture.keypoints.len();
@@ -177,10 +178,10 @@ fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> impl Iterator<Item = u8>
 }
 
 /// Returns the key of neighborhoods, without a measured ratio, which differs between images.
-fn key(given: &Given) -> String {
-    let source = given.source();
-    match attack::is_oracle(&given.neighbors) {
-        true => format!("{source} {}", given.inlier_ratio),
+fn key(row: &Row) -> String {
+    let source = attack::source(row);
+    match attack::is_oracle(&row.neighbors) {
+        true => format!("{source} {}", row.inlier_ratio),
         false => source,
     }
 }
@@ -188,7 +189,7 @@ fn key(given: &Given) -> String {
 /// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px
 /// (blue), the others orange; 3 lost".
 fn recovered(picture: &Picture, view: &View, within: f64) -> (f64, String) {
-    let released = picture.released.iter().find(|of| of.scheme == view.attack.scheme);
+    let released = picture.released.iter().find(|of| of.scheme == view.row.scheme);
     let is_released = |i: usize| match released.map(|of| &of.marks) {
         Some(Marks::Lines(all) | Marks::Rays(all)) => all.get(i).is_some_and(Option::is_some),
         Some(Marks::Points(all)) => all.get(i).is_some_and(Option::is_some),
@@ -231,7 +232,6 @@ fn distance(a: [f32; 2], b: [f32; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attack::Attack;
 
     #[test]
     fn shares_are_of_all_released_keypoints() {
@@ -251,13 +251,12 @@ mod tests {
             ..Picture::default()
         };
         let view = View {
-            attack: Attack { scheme: "cp2d".into(), ..Attack::default() },
+            row: Row { scheme: "cp2d".into(), ..Row::default() },
             recovered: vec![Some([3.0, 4.0]), Some([30.0, 4.0]), None, None, Some([5.0, 0.0])],
         };
         let (_, text) = recovered(&picture, &view, 5.0);
         assert_eq!(text, "50.0 % within 5 px (blue), the others orange; 1 lost");
-        let graph =
-            Graph { given: Given::default(), neighbors: vec![vec![[3.0, 0.0], [5.0, 0.0]]] };
+        let graph = Graph { row: Row::default(), neighbors: vec![vec![[3.0, 0.0], [5.0, 0.0]]] };
         let text = edges(&picture, &graph, 5.0);
         assert!(text.contains("50.0 % of the edges are shorter than 5 px"), "{text}");
     }

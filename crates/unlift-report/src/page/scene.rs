@@ -5,7 +5,7 @@
 
 use serde_json::{Value, json};
 
-use crate::attack::ByAttack;
+use crate::attack::{self, ByAttack};
 use crate::document::Row;
 use crate::page::blocks::{Blocks, NOT_DRAWN, coordinate};
 use crate::words;
@@ -106,7 +106,7 @@ pub(crate) fn encode(
 ) -> Option<Value> {
     let mut shown: Vec<(usize, &View)> = Vec::new();
     for view in &scene.views {
-        let row = rows.iter().position(|row| view.attack.is_of(row));
+        let row = rows.iter().position(|row| attack::is_same(&view.row, row));
         let is_new = |row: &usize| shown.iter().all(|(known, _)| known != row);
         shown.extend(row.filter(is_new).map(|row| (row, view)));
     }
@@ -177,13 +177,14 @@ fn encode_view(
     chosen: &[usize],
     error_unit: f32,
 ) -> (Vec<u8>, Fate) {
-    let released = scene.obfuscations.iter().find(|of| of.scheme == view.attack.scheme);
+    let released = scene.obfuscations.iter().find(|of| of.scheme == view.row.scheme);
     let is_withheld = |i| released.is_some_and(|released| released.withheld.contains(&i));
     let recovered = |i: usize| view.recovered.get(i).copied().unwrap_or([f32::NAN; 3]);
     let mut bytes = positions(bounds, chosen.iter().map(|&i| recovered(i)));
     let mut fate = Fate::default();
     for &i in chosen {
-        let error = distance(recovered(i), scene.originals[i]);
+        let away = recovered(i).into_iter().zip(scene.originals[i]).map(|(x, y)| (x - y) * (x - y));
+        let error = away.sum::<f32>().sqrt();
         match () {
             () if is_drawn(bounds, recovered(i)) => fate.visible += 1,
             () if !error.is_nan() => fate.outside += 1,
@@ -220,10 +221,6 @@ fn error_byte(relative: f32) -> u8 {
     }
     let share = (relative.max(1e-9).log10() / ERROR_DECADES).clamp(-1.0, 1.0) * 0.5 + 0.5;
     (share * f32::from(LOST - 1)).round() as u8
-}
-
-fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>().sqrt()
 }
 
 /// Counts of the points of one pane; each point is counted once.
@@ -334,7 +331,6 @@ fn mix(seed: u64, counter: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attack::Attack;
 
     fn scene(n: usize, n_views: usize) -> Scene3d {
         let originals: Vec<[f32; 3]> =
@@ -346,8 +342,7 @@ mod tests {
             n_records: n as u64,
             withheld: Vec::new(),
         };
-        let views = (0..n_views)
-            .map(|at| View { attack: Attack::of(&row(at)), recovered: originals.clone() });
+        let views = (0..n_views).map(|at| View { row: row(at), recovered: originals.clone() });
         Scene3d {
             cameras: originals.clone(),
             n_points: n as u64,

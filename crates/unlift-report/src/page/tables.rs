@@ -4,7 +4,7 @@ use unlift::audit::Interval;
 
 use indexmap::IndexMap;
 
-use crate::attack::{self, Given};
+use crate::attack;
 use crate::document::{Bound, BreakEven, ByReason, ByThreshold, Row};
 use crate::results::{Results, distinct};
 use crate::table::{Class, Column, NONE, Table, column, figure, known, label};
@@ -17,7 +17,7 @@ fn keys<'a>() -> Vec<Column<'a, Row>> {
     vec![
         label("scheme", |row: &Row| row.scheme.clone()),
         label("solver", |row: &Row| row.solver.clone()),
-        label("neighbors", |row: &Row| Given::of(row).plain_source()),
+        label("neighbors", attack::lists),
         figure("of them right", |row: &Row| {
             format!("{} %", words::ratio_percent(row.inlier_ratio))
         }),
@@ -52,7 +52,6 @@ fn share(
     }
 }
 
-/// Returns the table of main figures: percent recovered, a column per threshold.
 pub(crate) fn recovered(results: &Results<'_>) -> Table {
     let points = results.points();
     let repeats = results.rows.iter().map(|row| row.repeats).max().unwrap_or(1);
@@ -78,7 +77,6 @@ pub(crate) fn recovered(results: &Results<'_>) -> Table {
     Table::of("recovered", caption, results.rows, columns).without_empty_columns()
 }
 
-/// Returns the table of what an attacker recovers without lists of neighbors.
 pub(crate) fn baselines(results: &Results<'_>) -> Table {
     // A row, and what its records alone give away, or `None` for the blind guess.
     type Baseline<'a> = (&'a Row, Option<&'a ByThreshold>);

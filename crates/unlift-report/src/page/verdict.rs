@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use unlift::audit::Interval;
 
-use crate::attack::{self, Basis, Given};
+use crate::attack::{self, Basis};
 use crate::document::{Bound, BreakEven, Localization, Row};
 use crate::results::Results;
 use crate::words;
@@ -20,7 +20,6 @@ pub(crate) struct Verdict {
     pub refusals: Vec<Value>,
 }
 
-/// Judges every scheme by its strongest attacks, for the headline threshold.
 pub(crate) fn verdict(results: &Results<'_>) -> Verdict {
     let cards = cards(results);
     let refused = |(scheme, reason): (&str, &str)| json!({ "scheme": scheme, "title": words::scheme_title(scheme), "reason": reason });
@@ -138,7 +137,7 @@ fn lists_add(results: &Results<'_>, scheme: &str, floor: f64) -> String {
     // Solvers without neighborhoods do not show what lists add.
     let adds = |row: &&Row| attack::reads_lists(&row.solver) && !attack::intersects(&row.neighbors);
     let added = |row: &Row| {
-        let source = Given::of(row).plain_source();
+        let source = attack::lists(row);
         let gain = added(results.share(row) - floor);
         format!("{gain} ({})", source.trim_start_matches("neighbors "))
     };
@@ -189,7 +188,6 @@ impl Level {
     }
 }
 
-/// The verdict on one scheme.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Card {
     pub scheme: String,
@@ -264,7 +262,6 @@ impl Card {
     }
 }
 
-/// The verdict on a whole audit in a few lines.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Banner {
     pub level: Level,

@@ -189,7 +189,7 @@ fn curves_tables_and_canvas_are_drawn_without_complaints_or_network() {
 #[test]
 fn pictures_of_images_are_drawn_for_every_choice() {
     let options = RenderOptions { pictures: vec![sample::picture()], ..RenderOptions::default() };
-    let page = render(&sample::images(), None, &options).expect("a page");
+    let page = render(&sample::images(), &options).expect("a page");
     let drawn = "(() => {
         document.querySelectorAll('.controls input').forEach(i => i.click());
         return [root.dataset.pictures, ...[...document.querySelectorAll('.pictures canvas')].map(canvas => {

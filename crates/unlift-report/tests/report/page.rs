@@ -8,8 +8,8 @@ use crate::sample;
 
 /// Returns the page of an audit, to keep or to share.
 pub fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> String {
-    let options = RenderOptions { share_safe, ..RenderOptions::default() };
-    render(document, scene, &options).expect("a page")
+    let options = RenderOptions { share_safe, scene: scene.cloned(), ..RenderOptions::default() };
+    render(document, &options).expect("a page")
 }
 
 /// Removes all parts from `open` to `close`.
@@ -226,7 +226,7 @@ fn the_vendored_bundle_is_the_one_described() {
 fn a_page_of_images_speaks_of_keypoints_and_pixels() {
     let document = sample::images();
     let options = RenderOptions { pictures: vec![sample::picture()], ..RenderOptions::default() };
-    let page = render(&document, None, &options).expect("a page");
+    let page = render(&document, &options).expect("a page");
     let text = without_script(&page);
     assert!(text.contains("2 of 4 images. 1 could not be used. 1 had fewer keypoints"));
     let said = verdict(&document);
@@ -237,8 +237,8 @@ fn a_page_of_images_speaks_of_keypoints_and_pixels() {
     assert!(page.contains("kitchen/secret.jpg"));
     assert!(text_table(&document).contains("10 px"));
 
-    let safe =
-        render(&document, None, &RenderOptions { share_safe: true, ..options }).expect("a page");
+    let options = RenderOptions { share_safe: true, ..options };
+    let safe = render(&document, &options).expect("a page");
     assert!(!safe.contains("secret") && !safe.contains("id=\"picture-graph\""));
     let json = document.share_safe().to_json().expect("a document");
     assert!(!json.contains("secret") && json.contains("\"name\": null"));

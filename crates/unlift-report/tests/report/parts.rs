@@ -3,9 +3,7 @@
 use unlift_report::compare::{Accepted, compare};
 use unlift_report::document::{Document, GateResult, HeldOut, Localization, Row};
 use unlift_report::inversions::{Inversion, Painted};
-use unlift_report::{
-    Attack, ByAttack, Given, RenderOptions, gate_lines, junit, render, text_table,
-};
+use unlift_report::{ByAttack, RenderOptions, gate_lines, junit, render, text_table};
 
 use crate::page::page;
 use crate::sample;
@@ -212,7 +210,7 @@ fn painted_document() -> Document {
 
 fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
     let view = |row: &Row| ByAttack {
-        attack: Attack::of(row),
+        row: row.clone(),
         recovered: Painted { jpeg: vec![1], ssim: ssim(row), lpips: 0.3 },
     };
     let picture = sample::picture();
@@ -228,7 +226,7 @@ fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
 
 fn painted_page(document: &Document, inversions: Vec<Inversion>, share_safe: bool) -> String {
     let options = RenderOptions { inversions, share_safe, ..RenderOptions::default() };
-    render(document, None, &options).expect("a page")
+    render(document, &options).expect("a page")
 }
 
 #[test]
@@ -270,9 +268,8 @@ fn pictures_that_would_make_a_page_too_large_are_left_out() {
     let of = |n_photos: usize, bytes: usize| {
         let view = |at: usize| {
             let scheme = ["olc", "cp"][at % 2].into();
-            let given = Given { inlier_ratio: at as f64, ..Given::default() };
-            let attack = Attack { scheme, given, ..Attack::default() };
-            ByAttack { attack, recovered: Painted { jpeg: vec![7; bytes], ..Painted::default() } }
+            let row = Row { scheme, inlier_ratio: at as f64, ..Row::default() };
+            ByAttack { row, recovered: Painted { jpeg: vec![7; bytes], ..Painted::default() } }
         };
         let photo = Inversion { views: (0..40).map(view).collect(), ..Inversion::default() };
         let text = painted_page(&document, vec![photo; n_photos], false);

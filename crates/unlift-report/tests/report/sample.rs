@@ -2,10 +2,10 @@
 
 use indexmap::IndexMap;
 use unlift::Unit;
+use unlift_report::ByAttack;
 use unlift_report::document::*;
 use unlift_report::pictures::{Graph, Marks, Picture, ReleasedView};
 use unlift_report::scene::{ObfuscationView, Scene3d, Shapes};
-use unlift_report::{Attack, ByAttack, Given};
 
 pub const SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
 const RATIOS: [f64; 6] = [1.0, 0.75, 0.5, 0.3, 0.2, 0.1];
@@ -201,7 +201,7 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
             let size = if near { 0.02 } else { 1.0 };
             [0, 1, 2].map(|c| p[c] + size * (random(9 * i + c + r) - 0.5))
         });
-        ByAttack { attack: Attack::of(row), recovered: recovered.collect() }
+        ByAttack { row: row.clone(), recovered: recovered.collect() }
     });
     let cameras = (0..40).map(|i| [3.0 + (0.157 * i as f32).cos(), 2.2, 1.5]).collect();
     let (n_points, views) = (document.input.n_points, views.collect());
@@ -249,9 +249,10 @@ pub fn images() -> Document {
 pub fn picture() -> Picture {
     let place = |i: usize| [0, 1].map(|c| random(2 * i + c) * [640.0, 480.0][c]);
     let keypoints: Vec<[f32; 2]> = (0..300).map(place).collect();
-    let given = Given { neighbors: "oracle".into(), oracle_noise: None, inlier_ratio: 0.5 };
+    let (neighbors, solver) = ("oracle".to_owned(), "joint".to_owned());
+    let row = Row { neighbors, solver, inlier_ratio: 0.5, ..Row::default() };
     let views = ["lines2d", "cp2d"].map(|scheme| ByAttack {
-        attack: Attack { scheme: scheme.into(), given: given.clone(), solver: "joint".into() },
+        row: Row { scheme: scheme.into(), ..row.clone() },
         recovered: keypoints.iter().map(|p| Some(p.map(|x| x + 4.0))).collect(),
     });
     let lines = keypoints.iter().map(|p| Some([[p[0], 0.0], [p[0], 479.0]])).collect();
@@ -267,6 +268,6 @@ pub fn picture() -> Picture {
         keypoints,
         released: released.into(),
         views: views.into(),
-        graphs: vec![Graph { given, neighbors }],
+        graphs: vec![Graph { row, neighbors }],
     }
 }

@@ -29,6 +29,7 @@ use unlift::truth::{OriginalId, Secret};
 use unlift_io::hash::hash_files;
 use unlift_io::read;
 use unlift_report::Document;
+use unlift_report::attack::{SEQUENCE, SEQUENCE_AND_LISTS, TRACKS};
 use unlift_report::document::ImageCounts;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::pictures::Points;
@@ -61,14 +62,7 @@ pub struct Sequence<'a> {
     pub inversion: Option<Inversion>,
 }
 
-/// The solver of all rows.
 const SOLVER: &str = "triangulation";
-/// Links that the attacker makes from descriptors.
-const SEQUENCE: &str = "sequence";
-/// Links that the attacker makes from descriptors, combined with lists of neighbors within each query.
-const WITH_LISTS: &str = "sequence+lists";
-/// Links that the model's tracks give: the oracle.
-const TRACKS: &str = "tracks";
 /// A line of each of three views meets the others in a point.
 const LEAST_VIEWS: usize = 3;
 
@@ -143,7 +137,7 @@ impl Sequence<'_> {
     }
 
     fn kinds(&self) -> impl Iterator<Item = &'static str> {
-        [SEQUENCE, TRACKS].into_iter().chain(self.lists.is_some().then_some(WITH_LISTS))
+        [SEQUENCE, TRACKS].into_iter().chain(self.lists.is_some().then_some(SEQUENCE_AND_LISTS))
     }
 
     fn tried(&self, queries: &[usize]) -> Tried {
@@ -190,7 +184,7 @@ impl Sequence<'_> {
             let lists = self.lists.as_deref().map(|by| hidden.lists(by, plan.seed)).transpose()?;
             seconds.neighbors += started.elapsed().as_secs_f64();
             let kinds = [(SEQUENCE, links, None), (TRACKS, &tracks, None)];
-            let combined = lists.as_ref().map(|lists| (WITH_LISTS, links, Some(lists)));
+            let combined = lists.as_ref().map(|lists| (SEQUENCE_AND_LISTS, links, Some(lists)));
             for &n in queries {
                 for (by, links, lists) in kinds.into_iter().chain(combined) {
                     check_stop(progress)?;
@@ -208,7 +202,7 @@ impl Sequence<'_> {
                     };
                     let row = rows.iter().rfind(of).cloned().unwrap_or(row);
                     let row = Row { scheme, neighbors, k: n, solver: SOLVER.to_owned(), ..row };
-                    let strongest = if combined.is_some() { WITH_LISTS } else { SEQUENCE };
+                    let strongest = if combined.is_some() { SEQUENCE_AND_LISTS } else { SEQUENCE };
                     if let Some(inversion) = self.inversion.as_ref().filter(|_| by == strongest) {
                         let sheets = &mut rendering.inversions;
                         paint(inversion, (&hidden, &attack), &row, progress, sheets)?;
@@ -293,27 +287,14 @@ struct Attack<'a> {
     seed: u64,
 }
 
-/// A number of keypoints or links, and how many of them are right.
-#[derive(Clone, Copy, Default)]
-struct Share {
-    n: usize,
-    right: usize,
+/// Numbers of keypoints, and how many of them are right within the headline threshold: linked in three or more views, linked so by the
+/// model's tracks, and without a point of the service's map. Then links of which the model knows both keypoints.
+type Counts = [[usize; 2]; 4];
+
+fn count([n, right]: &mut [usize; 2], is_right: bool) {
+    *n += 1;
+    *right += usize::from(is_right);
 }
-
-impl Share {
-    fn count(&mut self, is_right: bool) {
-        self.n += 1;
-        self.right += usize::from(is_right);
-    }
-
-    fn percent(&self) -> Option<f64> {
-        (self.n > 0).then(|| 100.0 * self.right as f64 / self.n as f64)
-    }
-}
-
-/// Keypoints, right within the headline threshold: linked in three or more views, linked so by the model's tracks, and without a
-/// point of the service's map. Then links of which the model knows both keypoints.
-type Shares = [Share; 4];
 
 const NAMES: [&str; 3] = ["linked", "tracked", "new"];
 
@@ -348,24 +329,24 @@ impl Protected<'_> {
         let queries = (0..self.views.len()).into_par_iter().with_max_len(1);
         let solved = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
         let mut pooled = Pooled::new(&plan.thresholds);
-        let mut all = Shares::default();
-        for (query, (recovered, shares)) in solved.iter().enumerate() {
+        let mut all = Counts::default();
+        for (query, (recovered, counts)) in solved.iter().enumerate() {
             let (original, released) = (&self.views[query].original, &self.queries[query].released);
             pooled.add(recovered, original, &self.secrets[query], Some(released))?;
-            for (all, share) in all.iter_mut().zip(shares) {
-                *all = Share { n: all.n + share.n, right: all.right + share.right };
-            }
+            let sums = all.as_flattened_mut().iter_mut().zip(counts.as_flattened());
+            sums.for_each(|(sum, more)| *sum += more);
         }
         let missing = || unlift::Error::new("sequence", "keypoints", "none");
         let mut row = pooled.row().ok_or_else(missing)?;
-        let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
+        let percent = |n: usize, of: usize| 100.0 * n as f64 / of.max(1) as f64;
         let label = &plan.thresholds[plan.headline].label;
-        for (name, share) in NAMES.into_iter().zip(&all) {
-            row.metrics.insert(format!("{name}_percent"), of_all(share));
-            let within = share.percent().map(|of| (format!("{name}_within_{label}_percent"), of));
-            row.metrics.extend(within);
+        for (name, [n, right]) in NAMES.into_iter().zip(all) {
+            row.metrics.insert(format!("{name}_percent"), percent(n, row.n_points));
+            if n > 0 {
+                row.metrics.insert(format!("{name}_within_{label}_percent"), percent(right, n));
+            }
         }
-        row.inlier_ratio = all[3].percent().unwrap_or(0.0) / 100.0;
+        row.inlier_ratio = percent(all[3][1], all[3][0]) / 100.0;
         Ok(row)
     }
 
@@ -389,31 +370,31 @@ impl Protected<'_> {
         tracks: &Links,
         query: usize,
         headline: f64,
-    ) -> Result<(Recovered<2>, Shares), unlift::Error> {
+    ) -> Result<(Recovered<2>, Counts), unlift::Error> {
         let window = self.window(query, attack.n);
         let solved = self.solve(attack, query)?;
         let original = &self.views[query].original;
         let accuracy = evaluate(&solved.recovered, original, &self.secrets[query])?;
-        let mut shares = Shares::default();
+        let mut counts = Counts::default();
         for (slot, &error) in accuracy.errors().iter().enumerate() {
             let is_within = error <= headline;
             let point = self.point(query, slot);
-            let counts = [
+            let counted = [
                 solved.n_views[slot] >= LEAST_VIEWS,
                 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS,
                 point.is_none(),
             ];
-            for (share, _) in shares.iter_mut().zip(counts).filter(|(_, is)| *is) {
-                share.count(is_within);
+            for (of, _) in counts.iter_mut().zip(counted).filter(|(_, is)| *is) {
+                count(of, is_within);
             }
             let Some(point) = point else { continue };
             for (other, at) in attack.links.track(query, slot, &window) {
                 if let Some(other) = self.point(other as usize, at as usize) {
-                    shares[3].count(point == other);
+                    count(&mut counts[3], point == other);
                 }
             }
         }
-        Ok((solved.recovered, shares))
+        Ok((solved.recovered, counts))
     }
 
     /// Returns the `n` consecutive queries around `query`.

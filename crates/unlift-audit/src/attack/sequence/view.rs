@@ -16,7 +16,7 @@ use unlift_io::read::colmap::{self, Image};
 use unlift_vision::pictures::Lens;
 
 use crate::images::FeatureSource;
-use crate::images::keypoints::{Nearby, undistorted};
+use crate::images::keypoints::{Nearby, other_size, undistorted};
 
 /// A keypoint shows a point of the model if it is the nearest one to the point's projection and at
 /// most this far away, in pixels.
@@ -54,7 +54,6 @@ pub struct Model {
     cameras: Vec<colmap::Camera>,
     images: Vec<Image>,
     positions: Vec<[f64; 3]>,
-    /// Rows of the points of each image.
     shown: Vec<Vec<u32>>,
 }
 
@@ -114,17 +113,14 @@ impl Model {
         let wrong = |expected: &str, found: &str| unlift::Error::new("image", expected, found);
         let image = &self.images[of];
         let camera = image.camera(&self.cameras).ok_or_else(|| wrong("a camera", "none"))?;
-        let (width, height) = (camera.width_px, camera.height_px);
+        let size = [camera.width_px as f64, camera.height_px as f64];
         let lens = Lens::try_new(camera.model.name, &camera.params)?;
-        if let Some([w, h]) = features.size
-            && [u64::from(w), u64::from(h)] != [width, height]
-        {
-            let expected = format!("{width} x {height} pixels, as its camera in the model");
-            return Err(wrong(&expected, &format!("{w} x {h}")));
+        if let Some((expected, found)) = other_size(features.size, size) {
+            return Err(wrong(&expected, &found));
         }
         let descriptors = features.descriptors.as_ref();
         let descriptors = descriptors.ok_or_else(|| wrong("descriptors", "none"))?;
-        let bounds = bounds(&lens, [width as f64, height as f64])
+        let bounds = bounds(&lens, size)
             .ok_or_else(|| wrong("a camera with less than 180 degrees", "a wider one"))?;
         let pinhole = lens.intrinsics();
         let place = |(row, &keypoint): (usize, &[f64; 2])| {
@@ -144,7 +140,7 @@ impl Model {
             descriptors: descriptors.select(&kept),
             camera: Camera { intrinsics: pinhole, pose },
             lens,
-            size: [width as usize, height as usize],
+            size: size.map(|side| side as usize),
             n_left_out: features.keypoints.len() - kept.len(),
             name: features.name,
         })
@@ -207,20 +203,16 @@ fn in_time(images: &[(&str, u32, [f64; 3])]) -> Vec<usize> {
 /// Returns a key that sorts names as people count: `2.jpg` before `10.jpg`.
 ///
 /// A run of digits becomes its length without zeros in front, and itself. Names that differ in such zeros alone stay in their order.
-fn natural(name: &str) -> Vec<(usize, &str)> {
-    let is_digit = |c: char| c.is_ascii_digit();
+fn natural(name: &str) -> Vec<(usize, &[u8])> {
     let mut parts = Vec::new();
-    let mut rest = name;
-    while let Some(first) = rest.chars().next() {
-        let end = if is_digit(first) {
-            rest.find(|c| !is_digit(c)).unwrap_or(rest.len())
+    for run in name.as_bytes().chunk_by(|a, b| a.is_ascii_digit() && b.is_ascii_digit()) {
+        let zeros = run.iter().take_while(|&&digit| digit == b'0').count();
+        let number = &run[zeros..];
+        parts.push(if run[0].is_ascii_digit() {
+            (number.len(), number)
         } else {
-            first.len_utf8()
-        };
-        let (part, others) = rest.split_at(end);
-        let number = part.trim_start_matches('0');
-        parts.push(if is_digit(first) { (number.len(), number) } else { (usize::MAX, part) });
-        rest = others;
+            (usize::MAX, run)
+        });
     }
     parts
 }
