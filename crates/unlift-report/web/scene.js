@@ -114,7 +114,8 @@
       this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
       this.renderer.setClearColor(BACKGROUND);
       this.renderer.setScissorTest(true);
-      const { low, high, up } = this.data;
+      const { low, high, middle, up } = this.data;
+      const fromCenter = (place) => place.map((x, i) => x - (low[i] + high[i]) / 2);
       this.radius = 0.5 * Math.hypot(...low.map((x, i) => high[i] - x));
       this.scene = new THREE.Scene();
       const { eye } = this.data;
@@ -125,10 +126,13 @@
       // The view starts in any direction across `up`, slightly above the horizon.
       const across = Math.abs(up[0]) < 0.8 * Math.hypot(...up) ? new THREE.Vector3(1, 0.35, 0) : new THREE.Vector3(0.35, 0, 1);
       across.addScaledVector(this.up, -across.dot(this.up)).normalize();
-      this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 2.5);
+      this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 2.5).add(new THREE.Vector3(...fromCenter(middle)));
       // From the place of a camera, the map resembles the photo.
-      if (eye) this.camera.position.set(...eye.map((x, i) => x - (low[i] + high[i]) / 2));
+      if (eye) this.camera.position.set(...fromCenter(eye));
       this.controls = new THREE.OrbitControls(this.camera, canvas);
+      // Half of the points lie on either side of the target; the box may reach far beyond them.
+      this.controls.target.set(...fromCenter(middle));
+      this.controls.update();
       this.controls.enableZoom = false;
       this.controls.addEventListener("change", () => this.render());
       // The wheel scrolls the page until the view has focus.

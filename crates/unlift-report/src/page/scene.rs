@@ -85,10 +85,9 @@ pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
     budget.saturating_sub(fixed) / (BYTES_PER_POINT + n_views * BYTES_PER_RECOVERED)
 }
 
-/// Returns the camera in the box that is farthest from its middle, because it sees most of the scene.
+/// Returns the camera in the box that is farthest from the middle of the points, because it sees most of the scene.
 fn eye(bounds: &SceneBox, cameras: &[[f32; 3]]) -> Option<[f32; 3]> {
-    let middle: [f32; 3] = std::array::from_fn(|c| 0.5 * (bounds.low[c] + bounds.high[c]));
-    let far = |camera: &[f32; 3]| (0..3).map(|c| (camera[c] - middle[c]).powi(2)).sum::<f32>();
+    let far = |at: &[f32; 3]| (0..3).map(|c| (at[c] - bounds.middle[c]).powi(2)).sum::<f32>();
     let within = cameras.iter().filter(|&&camera| is_drawn(bounds, camera));
     within.copied().max_by(|a, b| far(a).total_cmp(&far(b)))
 }
@@ -134,6 +133,7 @@ pub(crate) fn encode(
     Some(json!({
         "low": bounds.low,
         "high": bounds.high,
+        "middle": bounds.middle,
         "up": scene.up.unwrap_or([0.0, 0.0, 1.0]),
         "n_points": scene.n_points.max(scene.originals.len() as u64),
         "n_drawn": chosen.len(),
@@ -206,7 +206,7 @@ fn positions(bounds: &SceneBox, points: impl Iterator<Item = [f32; 3]>) -> Vec<u
 }
 
 fn quantize(bounds: &SceneBox, point: [f32; 3]) -> [u16; 3] {
-    let SceneBox { low, high } = bounds;
+    let SceneBox { low, high, .. } = bounds;
     let shares = [0, 1, 2].map(|c| (point[c] - low[c]) / (high[c] - low[c]));
     // Ends of clipped lines lie on the box only up to rounding.
     match shares.iter().all(|share| (-1e-4..=1.0001).contains(share)) {
@@ -260,6 +260,8 @@ pub struct SceneBox {
     pub low: [f32; 3],
     /// Largest corner.
     pub high: [f32; 3],
+    /// The median of each coordinate.
+    pub middle: [f32; 3],
 }
 
 impl SceneBox {
@@ -272,6 +274,7 @@ impl SceneBox {
     pub fn robust(points: &[[f32; 3]]) -> Self {
         let mut low = [-0.5; 3];
         let mut high = [0.5; 3];
+        let mut middle = [0.0; 3];
         for axis in 0..3 {
             let mut values: Vec<f32> =
                 points.iter().map(|p| p[axis]).filter(|x| x.is_finite()).collect();
@@ -282,6 +285,7 @@ impl SceneBox {
             let last = values.len() - 1;
             low[axis] = values[last / 100];
             high[axis] = values[last - last / 100];
+            middle[axis] = values[last / 2];
         }
         let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
         let margin = if longest > 0.0 { 0.1 * longest } else { 0.5 };
@@ -289,7 +293,7 @@ impl SceneBox {
             low[axis] -= margin;
             high[axis] += margin;
         }
-        Self { low, high }
+        Self { low, high, middle }
     }
 
     /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is
