@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use image::RgbImage;
 use serde_json::Value;
@@ -15,11 +15,11 @@ impl Place {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
-    /// Creates a folder with these photos in `photos`, each with its own content.
-    pub fn with_photos(names: &[&str]) -> Self {
+    /// Creates a folder with three photos in `photos`, each with its own content.
+    pub fn with_photos() -> Self {
         let place = Self::empty();
-        for (at, name) in names.iter().enumerate() {
-            place.write_photo(&format!("photos/{name}"), at as u32);
+        for (name, which) in [("a.png", 0), ("b/c.jpg", 1), ("b/ü d.webp", 2)] {
+            place.write_photo(&format!("photos/{name}"), which);
         }
         place
     }
@@ -28,6 +28,13 @@ impl Place {
     pub fn with_room(n_points: usize) -> Self {
         let place = Self::empty();
         place.write_points("room.csv", &unlift::synthetic::room(1, n_points).points);
+        place
+    }
+
+    /// Creates a folder with the same room, and descriptors of `dim` bytes of its points in `d.bin`.
+    pub fn with_described_room(n_points: usize, dim: u32) -> Self {
+        let place = Self::with_room(n_points);
+        place.write_descriptors("d.bin", &unlift::synthetic::room(1, n_points).points, dim);
         place
     }
 
@@ -86,15 +93,6 @@ impl Place {
         serde_json::from_str(&self.text(name)).expect("JSON")
     }
 
-    /// Returns the sorted names of the entries of a folder.
-    pub fn names(&self, folder: &str) -> Vec<String> {
-        let entries = fs::read_dir(self.path(folder)).unwrap();
-        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-        let mut names: Vec<String> = names.collect();
-        names.sort();
-        names
-    }
-
     /// Returns the sorted paths of all files, relative to the folder.
     pub fn files(&self) -> Vec<String> {
         let (mut found, mut waiting) = (Vec::new(), vec![self.path("")]);
@@ -113,13 +111,14 @@ impl Place {
         found
     }
 
-    /// Returns a command that runs the program with these words in the folder;
-    /// `RAYON_NUM_THREADS=N` may be one of them.
+    /// Returns a command that runs the program with these words in the folder; words such as
+    /// `RAYON_NUM_THREADS=1` are variables.
     pub fn program<'a>(&self, words: impl IntoIterator<Item = &'a str>) -> Command {
+        let is_name = |name: &str| name.chars().all(|c| c.is_ascii_uppercase() || c == '_');
         let mut command = Command::new(env!("CARGO_BIN_EXE_unlift"));
         for word in words {
-            match word.strip_prefix("RAYON_NUM_THREADS=") {
-                Some(threads) => command.env("RAYON_NUM_THREADS", threads),
+            match word.split_once('=').filter(|(name, _)| is_name(name)) {
+                Some((name, value)) => command.env(name, value),
                 None => command.arg(word),
             };
         }
@@ -135,12 +134,6 @@ impl Place {
         let mut shell = Command::new("sh");
         shell.args(["-c", line]).env("PATH", std::env::join_paths(path).expect("a path"));
         shell.current_dir(self.0.path()).stdin(Stdio::null()).output().expect("a shell")
-    }
-
-    /// Starts the program without capturing its output.
-    pub fn start(&self, line: &str) -> Child {
-        let mut command = self.program(line.split_whitespace());
-        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
     }
 
     /// Runs a line that must end with `code`, and returns stdout and stderr.
