@@ -2,28 +2,25 @@
 
 use crate::common::{Place, recovered, row, rows};
 
-const N_POINTS: usize = 300;
-
-fn points() -> Vec<[f64; 3]> {
+/// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
+/// Returns the points of the first.
+fn maps() -> (Place, Vec<[f64; 3]>) {
     // Numbers in [0, 1) for any index.
     let random = |at: usize| (at as f64 * 0.754_877_666 + 0.1).fract();
     let unit = |at: usize| [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
-    (0..N_POINTS).map(unit).map(|[x, y, z]| [5.0 * x, 4.0 * y, 3.0 * z]).collect()
-}
-
-/// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
-fn maps() -> Place {
-    let (place, points) = (Place::empty(), points());
-    for (name, n) in [("a", N_POINTS), ("b", N_POINTS - N_POINTS / 10)] {
-        place.write_points(&format!("{name}.csv"), &points[..n]);
-        place.write_descriptors(&format!("{name}.bin"), &points[..n], 128);
+    let points: Vec<[f64; 3]> =
+        (0..300).map(unit).map(|[x, y, z]| [5.0 * x, 4.0 * y, 3.0 * z]).collect();
+    let place = Place::empty();
+    for (name, points) in [("a", &points[..]), ("b", &points[..270])] {
+        place.write_points(&format!("{name}.csv"), points);
+        place.write_descriptors(&format!("{name}.bin"), points, 128);
     }
-    place
+    (place, points)
 }
 
 #[test]
 fn two_releases_give_points_back_unless_they_are_gone_in_the_second() {
-    let place = maps();
+    let (place, _) = maps();
     let line = "audit again a.csv a.csv --scale 1 --descriptors a.bin --schemes olc,plane,olc/cp \
                 --no-records-alone --out a";
     let (stdout, _) = place.ends(line, 0);
@@ -54,7 +51,7 @@ fn two_releases_give_points_back_unless_they_are_gone_in_the_second() {
 /// Every run of SfM chooses its own frame and scale.
 #[test]
 fn no_gate_holds_if_the_maps_are_in_other_frames_or_scales() {
-    let (place, points) = (maps(), points());
+    let (place, points) = maps();
     let audit = "audit again a.csv c.csv --scale 1 --schemes olc --out a";
     let gate = "--gate olc:again-geometry:0.10<=100";
     let described = "--descriptors a.bin --descriptors a.bin";
@@ -70,8 +67,8 @@ fn no_gate_holds_if_the_maps_are_in_other_frames_or_scales() {
         let (text, stderr) = place.ends(&format!("{audit} {described} {gate}"), code);
         assert!(text.contains(expected) && stderr.contains(expected), "{text} {stderr}");
     }
-    let far: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| x + 20.0)).collect();
-    place.write_points("c.csv", &far);
+    let far = points.iter().map(|p| p.map(|x| x + 20.0));
+    place.write_points("c.csv", &far.collect::<Vec<_>>());
     let (text, _) = place.ends(&format!("{audit} {gate}"), 1);
     assert!(text.contains("near 0 of 300 points of the first one"), "{text}");
 }

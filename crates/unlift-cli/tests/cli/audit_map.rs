@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use serde_json::Value;
+
 use crate::common::{Place, rows};
 
 /// Errors are one line, with a line of advice if there is any, and come before any work.
@@ -85,16 +87,15 @@ fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
     let attacks = |more: &str| {
         place.ends(&format!("audit map room.csv --scale 1 --k 10 --quick {more} --out a"), 0);
         let document = place.json("a/audit.json");
-        let mut found: Vec<String> = rows(&document)
-            .iter()
-            .inspect(|row| assert!(row["neighbors"] != "oracle" || row["inlier_ratio"] == 0.5))
-            .map(|row| format!("{} {}", row["scheme"], row["neighbors"]).replace('"', ""))
-            .collect();
+        let is_half = |row: &Value| row["neighbors"] != "oracle" || row["inlier_ratio"] == 0.5;
+        assert!(rows(&document).iter().all(is_half), "{document}");
+        let attack = |row: &Value| format!("{} {}", row["scheme"], row["neighbors"]);
+        let mut found: Vec<String> = rows(&document).iter().map(attack).collect();
         found.dedup();
-        found
+        found.join(", ").replace('"', "")
     };
-    assert_eq!(attacks(""), ["olc oracle", "ppl oracle"]);
-    let with = ["olc oracle", "olc similarity", "ppl oracle", "ppl similarity"];
+    assert_eq!(attacks(""), "olc oracle, ppl oracle");
+    let with = "olc oracle, olc similarity, ppl oracle, ppl similarity";
     assert_eq!(attacks("--descriptors d.bin"), with);
     place.refuses("audit map room.csv --quick", &[("--schemes ppl", 2, "cannot be used with")]);
 }

@@ -18,8 +18,10 @@ impl Place {
     /// Creates a folder with three photos in `photos`, each with its own content.
     pub fn with_photos() -> Self {
         let place = Self::empty();
-        for (name, which) in [("a.png", 0), ("b/c.jpg", 1), ("b/ü d.webp", 2)] {
-            place.write_photo(&format!("photos/{name}"), which);
+        for (file, which) in [("photos/a.png", 0), ("photos/b/c.jpg", 1), ("photos/b/ü d.webp", 2)]
+        {
+            place.write(file, "");
+            photo(which).save(place.path(file)).unwrap();
         }
         place
     }
@@ -47,11 +49,6 @@ impl Place {
     pub fn write_points(&self, name: &str, points: &[[f64; 3]]) {
         let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
         self.write(name, text);
-    }
-
-    pub fn write_photo(&self, name: &str, which: u32) {
-        self.write(name, "");
-        photo(which).save(self.path(name)).unwrap();
     }
 
     /// Writes a descriptor of `dim` bytes per point; near points have similar ones.
@@ -188,7 +185,7 @@ pub fn texts(output: &Output) -> (String, String) {
 }
 
 /// Draws blobs of several sizes at positions that depend on `which`.
-pub fn photo(which: u32) -> RgbImage {
+fn photo(which: u32) -> RgbImage {
     RgbImage::from_fn(128, 96, |x, y| {
         let (x, y) = (f64::from(x + 9 * which), f64::from(y));
         let wave = (x / 5.0).sin() * (y / 7.0).cos() + (x * y / 90.0).sin();
