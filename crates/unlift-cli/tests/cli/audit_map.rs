@@ -22,6 +22,10 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ("empty", 3, "found none", "the folder of a COLMAP model or project; for photos, unlift audit images"),
         ("room.csv --neighbors room.csv", 3, "room.csv: expected an archive of NumPy arrays (.npz), found another file", ""),
         ("room.csv --scale 0", 2, number, ""),
+        // Negative numbers are values, not options.
+        ("room.csv --scale -1", 2, number, ""),
+        ("room.csv --thresholds -1", 2, "expected a number above 0, found -1", ""),
+        ("room.csv --inlier-ratios -1", 2, "expected a number from 0 to 1, found -1", ""),
         ("room.csv --scale inf", 2, number, ""),
         ("room.csv --scale 1e-300", 2, "units across, found 1e-300", "--scale 1 for a map in meters"),
         ("room.csv --scale 1e-3", 2, "any guess would count as recovered", "another --scale"),
@@ -97,7 +101,10 @@ fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
     assert_eq!(attacks(""), "olc oracle, ppl oracle");
     let with = "olc oracle, olc similarity, ppl oracle, ppl similarity";
     assert_eq!(attacks("--descriptors d.bin"), with);
-    place.refuses("audit map room.csv --quick", &[("--schemes ppl", 2, "cannot be used with")]);
+    place.refuses(
+        "audit map room.csv --quick",
+        &[("--schemes ppl", 2, "cannot be used with"), ("--k -1", 2, "-1 is not in 1..=65535")],
+    );
 }
 
 /// The verdict of a scheme that publishes bearings leads with what they show.

@@ -65,13 +65,3 @@ fn no_gate_holds_on_a_scheme_that_the_map_does_not_allow() {
     place.refuses("audit map flat.csv", &[("--schemes ppl+ --out b", 3, none)]);
     assert!(!place.path("b").exists());
 }
-
-#[test]
-fn images_that_cannot_be_used_are_an_error_beside_the_gates() {
-    let place = Place::with_photos();
-    place.write("photos/c.png", "no picture");
-    let line = "audit images photos --schemes cp2d --inlier-ratios 1 --k 5 --quiet --out a";
-    place.ends(&format!("{line} --gate cp2d:10<=100 --junit g.xml"), 3);
-    let junit = place.text("g.xml");
-    assert!(junit.contains("failures=\"0\" errors=\"1\""), "{junit}");
-}

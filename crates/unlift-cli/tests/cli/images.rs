@@ -44,13 +44,16 @@ fn broken_images_are_named_counted_and_left_out() {
     RgbImage::new(1, 1).save(place.path("photos/one.png")).unwrap();
     // An image with too few keypoints to attack counts as usable.
     RgbImage::new(40, 40).save(place.path("photos/plain.png")).unwrap();
-    let (stdout, stderr) = place.ends(&format!("audit images photos {QUICK} --out a"), 3);
+    let gate = "--gate cp2d:10<=100 --junit g.xml";
+    let (stdout, stderr) = place.ends(&format!("audit images photos {QUICK} {gate} --out a"), 3);
     assert!(stdout.contains("report: a/report.html"));
+    let junit = place.text("g.xml");
+    assert!(junit.contains("failures=\"0\" errors=\"1\""), "{junit}");
     let total = "unlift: photos: expected 7 images that can be used, found 4\n";
     let each = "unlift: photos/cut.jpg: expected a whole JPEG image, found one that is cut off\n\
                 unlift: photos/one.png: expected at least 3 pixels a side, found 1 x 1\n\
                 unlift: photos/text.jpg: expected a JPEG, PNG or WebP image, found text\n";
-    assert_eq!(stderr, format!("{each}{total}"));
+    assert!(stderr.ends_with(&format!("{each}{total}")), "{stderr}");
     let counts = place.json("a/audit.json")["input"]["images"].clone();
     let counts = ["found", "used", "unusable", "too_small"].map(|name| counts[name].as_u64());
     assert_eq!(counts, [7, 4, 3, 1].map(Some));
