@@ -164,9 +164,9 @@ mod tests {
         let status_now = || status(bar.position(), bar.length(), Duration::ZERO);
         progress.show(0, 2, "a.jpg");
         (0..2).for_each(|_| progress.add(1.0 / 3.0, ""));
-        assert_eq!((status_now(), bar.message()), ("33 %".to_owned(), "a.jpg".to_owned()));
+        assert_eq!([status_now(), bar.message()], ["33 %", "a.jpg"]);
         progress.add(1.0 / 3.0, "b.jpg");
-        assert_eq!((status_now(), bar.message()), ("50 %".to_owned(), "b.jpg".to_owned()));
+        assert_eq!([status_now(), bar.message()], ["50 %", "b.jpg"]);
         (0..2).for_each(|_| progress.add(1.0, ""));
         progress.show(1, 2, "");
         assert_eq!(status_now(), "99 %");

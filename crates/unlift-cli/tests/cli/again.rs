@@ -2,28 +2,25 @@
 
 use crate::common::{Place, recovered, row, rows};
 
-const N_POINTS: usize = 300;
-
-fn points() -> Vec<[f64; 3]> {
+/// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
+/// Returns the points of the first.
+fn maps() -> (Place, Vec<[f64; 3]>) {
     // Numbers in [0, 1) for any index.
     let random = |at: usize| (at as f64 * 0.754_877_666 + 0.1).fract();
     let unit = |at: usize| [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
-    (0..N_POINTS).map(unit).map(|[x, y, z]| [5.0 * x, 4.0 * y, 3.0 * z]).collect()
-}
-
-/// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
-fn maps() -> Place {
-    let (place, points) = (Place::empty(), points());
-    for (name, points) in [("a", &points[..]), ("b", &points[..N_POINTS - N_POINTS / 10])] {
+    let points: Vec<[f64; 3]> =
+        (0..300).map(unit).map(|[x, y, z]| [5.0 * x, 4.0 * y, 3.0 * z]).collect();
+    let place = Place::empty();
+    for (name, points) in [("a", &points[..]), ("b", &points[..270])] {
         place.write_points(&format!("{name}.csv"), points);
         place.write_descriptors(&format!("{name}.bin"), points, 128);
     }
-    place
+    (place, points)
 }
 
 #[test]
-fn two_releases_give_points_back() {
-    let place = maps();
+fn two_releases_give_points_back_unless_they_are_gone_in_the_second() {
+    let (place, _) = maps();
     let line = "audit again a.csv a.csv --scale 1 --descriptors a.bin --schemes olc,plane,olc/cp \
                 --no-records-alone --out a";
     let (stdout, _) = place.ends(line, 0);
@@ -38,17 +35,11 @@ fn two_releases_give_points_back() {
     }
     let open = row(&document, "plane", "again")["metrics"]["open_percent"].as_f64();
     assert!(open > Some(99.0), "{open:?}");
-}
-
-#[test]
-fn what_is_gone_in_the_second_map_does_not_come_back() {
-    let place = maps();
     let audit = "audit again a.csv b.csv --scale 1 --schemes olc --no-records-alone";
     let expected = "--descriptors: expected one file for A and one for B";
     place.refuses(audit, &[("--descriptors a.bin", 2, expected)]);
     place.ends(&format!("{audit} --descriptors a.bin --descriptors b.bin --out a"), 0);
-    let document = place.json("a/audit.json");
-    for row in rows(&document) {
+    for row in rows(&place.json("a/audit.json")) {
         let share = recovered(row, "0.10");
         assert!((85.0..=93.0).contains(&share), "{}: {share}", row["neighbors"]);
     }
@@ -60,25 +51,24 @@ fn what_is_gone_in_the_second_map_does_not_come_back() {
 /// Every run of SfM chooses its own frame and scale.
 #[test]
 fn no_gate_holds_if_the_maps_are_in_other_frames_or_scales() {
-    let (place, points) = (maps(), points());
+    let (place, points) = maps();
     let audit = "audit again a.csv c.csv --scale 1 --schemes olc --out a";
     let gate = "--gate olc:again-geometry:0.10<=100";
     let described = "--descriptors a.bin --descriptors a.bin";
-    for (change, expected) in [
-        (&(|p: [f64; 3]| p) as &dyn Fn([f64; 3]) -> [f64; 3], ""),
-        (
-            &|[x, y, z]| [-y, x + 2.0, z],
-            "a turn of the first map by 90.0 degrees, a scale of 1.00 and",
-        ),
-        (&|p| p.map(|x| 0.37 * x), "a turn of the first map by 0.0 degrees, a scale of 0.370 and"),
+    for (sin, cos, scale, expected) in [
+        (0.0, 1.0, 1.0, ""),
+        (1.0, 0.0, 1.0, "a turn of the first map by 90.0 degrees, a scale of 1.00 and"),
+        (0.0, 1.0, 0.37, "a turn of the first map by 0.0 degrees, a scale of 0.370 and"),
     ] {
-        place.write_points("c.csv", &points.iter().map(|p| change(*p)).collect::<Vec<_>>());
+        let turned = |[x, y, z]: &[f64; 3]| [cos * x - sin * y, sin * (x + 2.0) + cos * y, *z];
+        let moved = points.iter().map(|p| turned(p).map(|x| scale * x));
+        place.write_points("c.csv", &moved.collect::<Vec<_>>());
         let code = i32::from(!expected.is_empty());
         let (text, stderr) = place.ends(&format!("{audit} {described} {gate}"), code);
         assert!(text.contains(expected) && stderr.contains(expected), "{text} {stderr}");
     }
-    let far: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| x + 20.0)).collect();
-    place.write_points("c.csv", &far);
+    let far = points.iter().map(|p| p.map(|x| x + 20.0));
+    place.write_points("c.csv", &far.collect::<Vec<_>>());
     let (text, _) = place.ends(&format!("{audit} {gate}"), 1);
     assert!(text.contains("near 0 of 300 points of the first one"), "{text}");
 }

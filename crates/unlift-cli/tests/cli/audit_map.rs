@@ -1,8 +1,70 @@
-//! `unlift audit map`: results, baselines, noise and lengths.
+//! `unlift audit map`: what is read, the error for what is not, and what is written.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
 
 use crate::common::{Place, rows};
 
-const QUICK: &str = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.5";
+/// Errors are one line, with a line of advice if there is any, and come before any work.
+#[test]
+#[rustfmt::skip] // One row per line.
+fn what_cannot_be_meant_is_refused_with_a_way_out() {
+    let place = Place::with_described_room(700, 128);
+    place.write("two.xyz", "1 2 3\n4 5 6\n");
+    fs::create_dir(place.path("empty")).unwrap();
+    let number = "expected meters per unit of the map, a number above 0, found ";
+    let overlap = "expected with --neighbors oracle, found only overlap";
+    for (line, code, expected, advice) in [
+        ("nothing.ply", 3, "nothing.ply: expected a file or folder, found nothing", ""),
+        ("two.xyz", 3, "two.xyz: points: expected at least 11 (K + 1), found 2", ""),
+        ("empty", 3, "found none", "the folder of a COLMAP model or project; for photos, unlift audit images"),
+        ("room.csv --neighbors room.csv", 3, "room.csv: expected an archive of NumPy arrays (.npz), found another file", ""),
+        ("room.csv --scale 0", 2, number, ""),
+        // Negative numbers are values, not options.
+        ("room.csv --scale -1", 2, number, ""),
+        ("room.csv --thresholds -1", 2, "expected a number above 0, found -1", ""),
+        ("room.csv --inlier-ratios -1", 2, "expected a number from 0 to 1, found -1", ""),
+        ("room.csv --scale inf", 2, number, ""),
+        ("room.csv --scale 1e-300", 2, "units across, found 1e-300", "--scale 1 for a map in meters"),
+        ("room.csv --scale 1e-3", 2, "any guess would count as recovered", "another --scale"),
+        ("room.csv --scale 1e5", 2, "no attack could come near", "another --scale"),
+        ("room.csv --thresholds 1e9", 2, "unlift: --thresholds: expected a map larger", ""),
+        ("room.csv --scale 1 --expect-extent 20..50", 2, "a longest side of 20 to 50 m, found ", ""),
+        ("room.csv --scale 1 --expect-extent 9", 2, "expected LOW..HIGH in meters", ""),
+        // The gate has a threshold in meters, but the audit has no scale.
+        ("room.csv --gate olc:0.10<=20", 2, "expected one of 1.0, 2.5, found 0.1", "--scale and --thresholds, which change them"),
+        ("room.csv --neighbors overlap", 2, "--neighbors overlap: expected descriptors (--descriptors FILE), found none", ""),
+        ("room.csv --neighbors overlap --descriptors d.bin --inlier-ratios 0.5", 2, overlap, ""),
+        ("room.csv --neighbors overlap --descriptors d.bin --oracle-noise near", 2, overlap, ""),
+    ] {
+        let told = place.complains(&format!("audit map {line} --k 10 --schemes olc --quiet --out a"), code);
+        assert!(told.contains(expected), "{line}: {told}");
+        assert!(advice.is_empty() || told.contains(&format!("\n  try: {advice}")), "{line}: {told}");
+        assert!(!place.path("a").exists(), "{line}");
+    }
+    let told = place.complains("obfuscate room.csv --schemes olc --scale 1e-300 --out a", 2);
+    assert!(told.starts_with("unlift: --scale 1e-300: expected"), "{told}");
+    place.ends("obfuscate room.csv --schemes olc --k 10 --out hidden", 0);
+    let expected = "expected some, as neighbors by overlap need them, found none\n  \
+                    try: --neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE\n";
+    place.refuses("neighbors", &[("hidden/released.npz --neighbors overlap", 3, expected)]);
+}
+
+#[test]
+fn descriptors_beside_the_model_are_used_unless_only_the_oracle_is_wanted() {
+    let place = Place::empty();
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../unlift-io/tests/data/project");
+    let database = project.join("database.db");
+    let note = format!("unlift: note: descriptors: {}, beside the model", database.display());
+    for (more, is_used) in [("", true), (" --neighbors oracle", false)] {
+        let line = format!("audit map {} --k 3 --schemes olc{more}", project.display());
+        assert_eq!(place.ends(&line, 0).1.contains(&note), is_used, "{more}");
+        let document = place.json("unlift-audit/audit.json");
+        assert_eq!(document["input"]["other_sha256"]["descriptors"].is_string(), is_used, "{more}");
+    }
+}
 
 /// A share-safe report contains neither the name nor a hash of the map, which would confirm a
 /// guess.
@@ -10,13 +72,13 @@ const QUICK: &str = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.5";
 fn a_shareable_report_names_nothing() {
     let place = Place::with_room(200);
     let hash = unlift_io::hash::hash_files(&[place.path("room.csv")]).unwrap();
-    for (more, is_named) in [("--out a", true), ("--share-safe --out b", false)] {
-        place.ends(&format!("audit map room.csv {QUICK} --scale 1 {more}"), 0);
-        let folder = &more[more.len() - 1..];
-        for file in ["audit.json", "report.html"] {
-            let text = place.text(&format!("{folder}/{file}"));
+    for (more, is_named) in [("", true), ("--share-safe", false)] {
+        let line = format!("audit map room.csv --quick --k 10 --scale 1 {more} --out a");
+        place.ends(&line, 0);
+        for file in ["a/audit.json", "a/report.html"] {
+            let text = place.text(file);
             for trace in ["room.csv", &hash, "sha256"] {
-                assert_eq!(text.contains(trace), is_named, "{folder}/{file}: {trace}");
+                assert_eq!(text.contains(trace), is_named, "{more} {file}: {trace}");
             }
         }
     }
@@ -25,31 +87,30 @@ fn a_shareable_report_names_nothing() {
 /// `--quick` audits two schemes at one ratio, and one source if there are descriptors.
 #[test]
 fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
-    let place = Place::with_room(700);
-    place.write_descriptors("d.bin", &unlift::synthetic::room(1, 700).points, 64);
+    let place = Place::with_described_room(700, 64);
     let attacks = |more: &str| {
         place.ends(&format!("audit map room.csv --scale 1 --k 10 --quick {more} --out a"), 0);
         let document = place.json("a/audit.json");
-        let mut found: Vec<String> = rows(&document)
-            .iter()
-            .inspect(|row| assert!(row["neighbors"] != "oracle" || row["inlier_ratio"] == 0.5))
-            .map(|row| format!("{} {}", row["scheme"], row["neighbors"]).replace('"', ""))
-            .collect();
+        let is_half = |row: &Value| row["neighbors"] != "oracle" || row["inlier_ratio"] == 0.5;
+        assert!(rows(&document).iter().all(is_half), "{document}");
+        let attack = |row: &Value| format!("{} {}", row["scheme"], row["neighbors"]);
+        let mut found: Vec<String> = rows(&document).iter().map(attack).collect();
         found.dedup();
-        found
+        found.join(", ").replace('"', "")
     };
-    assert_eq!(attacks(""), ["olc oracle", "ppl oracle"]);
-    let with = ["olc oracle", "olc similarity", "ppl oracle", "ppl similarity"];
+    assert_eq!(attacks(""), "olc oracle, ppl oracle");
+    let with = "olc oracle, olc similarity, ppl oracle, ppl similarity";
     assert_eq!(attacks("--descriptors d.bin"), with);
-    let both = ("--schemes ppl --out b", 2, "cannot be used with");
-    place.refuses("audit map room.csv --quick", &[both]);
+    place.refuses(
+        "audit map room.csv --quick",
+        &[("--schemes ppl", 2, "cannot be used with"), ("--k -1", 2, "-1 is not in 1..=65535")],
+    );
 }
 
 /// The verdict of a scheme that publishes bearings leads with what they show.
 #[test]
 fn bearings_are_audited_and_painted() {
-    let place = Place::with_room(700);
-    place.write_descriptors("d.bin", &unlift::synthetic::room(1, 700).points, 128);
+    let place = Place::with_described_room(700, 128);
     let audit = "audit map room.csv --scale 1 --descriptors d.bin --neighbors similarity";
     let (stdout, _) = place.ends(&format!("{audit} --schemes sphere --out s"), 0);
     assert!(stdout.contains("bearing"), "{stdout}");

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use image::RgbImage;
 use serde_json::Value;
@@ -15,11 +15,13 @@ impl Place {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
-    /// Creates a folder with these photos in `photos`, each with its own content.
-    pub fn with_photos(names: &[&str]) -> Self {
+    /// Creates a folder with three photos in `photos`, each with its own content.
+    pub fn with_photos() -> Self {
         let place = Self::empty();
-        for (at, name) in names.iter().enumerate() {
-            place.write_photo(&format!("photos/{name}"), at as u32);
+        for (file, which) in [("photos/a.png", 0), ("photos/b/c.jpg", 1), ("photos/b/ü d.webp", 2)]
+        {
+            place.write(file, "");
+            photo(which).save(place.path(file)).unwrap();
         }
         place
     }
@@ -28,6 +30,13 @@ impl Place {
     pub fn with_room(n_points: usize) -> Self {
         let place = Self::empty();
         place.write_points("room.csv", &unlift::synthetic::room(1, n_points).points);
+        place
+    }
+
+    /// Creates a folder with the same room, and descriptors of `dim` bytes of its points in `d.bin`.
+    pub fn with_described_room(n_points: usize, dim: u32) -> Self {
+        let place = Self::with_room(n_points);
+        place.write_descriptors("d.bin", &unlift::synthetic::room(1, n_points).points, dim);
         place
     }
 
@@ -40,11 +49,6 @@ impl Place {
     pub fn write_points(&self, name: &str, points: &[[f64; 3]]) {
         let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
         self.write(name, text);
-    }
-
-    pub fn write_photo(&self, name: &str, which: u32) {
-        self.write(name, "");
-        photo(which).save(self.path(name)).unwrap();
     }
 
     /// Writes a descriptor of `dim` bytes per point; near points have similar ones.
@@ -86,15 +90,6 @@ impl Place {
         serde_json::from_str(&self.text(name)).expect("JSON")
     }
 
-    /// Returns the sorted names of the entries of a folder.
-    pub fn names(&self, folder: &str) -> Vec<String> {
-        let entries = fs::read_dir(self.path(folder)).unwrap();
-        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-        let mut names: Vec<String> = names.collect();
-        names.sort();
-        names
-    }
-
     /// Returns the sorted paths of all files, relative to the folder.
     pub fn files(&self) -> Vec<String> {
         let (mut found, mut waiting) = (Vec::new(), vec![self.path("")]);
@@ -113,13 +108,14 @@ impl Place {
         found
     }
 
-    /// Returns a command that runs the program with these words in the folder;
-    /// `RAYON_NUM_THREADS=N` may be one of them.
+    /// Returns a command that runs the program with these words in the folder; words such as
+    /// `RAYON_NUM_THREADS=1` are variables.
     pub fn program<'a>(&self, words: impl IntoIterator<Item = &'a str>) -> Command {
+        let is_name = |name: &str| name.chars().all(|c| c.is_ascii_uppercase() || c == '_');
         let mut command = Command::new(env!("CARGO_BIN_EXE_unlift"));
         for word in words {
-            match word.strip_prefix("RAYON_NUM_THREADS=") {
-                Some(threads) => command.env("RAYON_NUM_THREADS", threads),
+            match word.split_once('=').filter(|(name, _)| is_name(name)) {
+                Some((name, value)) => command.env(name, value),
                 None => command.arg(word),
             };
         }
@@ -135,12 +131,6 @@ impl Place {
         let mut shell = Command::new("sh");
         shell.args(["-c", line]).env("PATH", std::env::join_paths(path).expect("a path"));
         shell.current_dir(self.0.path()).stdin(Stdio::null()).output().expect("a shell")
-    }
-
-    /// Starts the program without capturing its output.
-    pub fn start(&self, line: &str) -> Child {
-        let mut command = self.program(line.split_whitespace());
-        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
     }
 
     /// Runs a line that must end with `code`, and returns stdout and stderr.
@@ -195,7 +185,7 @@ pub fn texts(output: &Output) -> (String, String) {
 }
 
 /// Draws blobs of several sizes at positions that depend on `which`.
-pub fn photo(which: u32) -> RgbImage {
+fn photo(which: u32) -> RgbImage {
     RgbImage::from_fn(128, 96, |x, y| {
         let (x, y) = (f64::from(x + 9 * which), f64::from(y));
         let wave = (x / 5.0).sin() * (y / 7.0).cos() + (x * y / 90.0).sin();

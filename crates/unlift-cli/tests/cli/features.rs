@@ -1,16 +1,11 @@
-//! `unlift features`: photos and files in, one complete file out, unusable images named.
-
-use image::GrayImage;
+//! `unlift features` and `unlift models`: photos and files in, one complete file out, and missing
+//! networks named.
 
 use crate::common::Place;
 
-fn photos() -> Place {
-    Place::with_photos(&["a.png", "b/c.jpg", "b/ü d.webp"])
-}
-
 #[test]
 fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
-    let place = photos();
+    let place = Place::with_photos();
     // Synthetic photos have faint keypoints.
     for (kind, more) in [("sift", ""), ("aliked", "--min-score 0.05")] {
         let line = format!("features photos --features {kind} {more}");
@@ -21,7 +16,6 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
         place.ends("features one.h5 --out copy.h5", 0);
         let [one, four, copy] = ["one.h5", "four.h5", "copy.h5"].map(|name| place.bytes(name));
         assert!(one == four && one == copy, "{kind}");
-        assert_eq!(place.names(""), ["copy.h5", "four.h5", "one.h5", "photos"]);
         let images = place.features("one.h5");
         let names: Vec<&str> = images.iter().map(|image| &*image.name).collect();
         assert_eq!(names, ["a.png", "b/c.jpg", "b/ü d.webp"]);
@@ -31,12 +25,13 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
             assert_eq!((descriptors.len(), descriptors.dim()), (image.keypoints.len(), 128));
         }
     }
+    assert_eq!(place.files().len(), 3 + 3, "nothing else is left");
 }
 
 #[test]
 #[rustfmt::skip] // One row per line.
 fn options_are_those_of_the_extractor() {
-    let place = photos();
+    let place = Place::with_photos();
     let count = |options: &str| {
         let (stdout, _) = place.ends(&format!("features photos {options}"), 0);
         stdout.split(' ').nth(2).and_then(|n| n.parse::<usize>().ok()).expect("a number")
@@ -57,14 +52,18 @@ fn options_are_those_of_the_extractor() {
 }
 
 #[test]
-fn a_broken_photo_is_one_line_and_the_rest_is_written() {
-    let place = photos();
-    let jpeg = place.bytes("photos/b/c.jpg");
-    place.write("photos/cut.jpg", &jpeg[..jpeg.len() / 2]);
-    place.write("photos/note.jpg", "not a photo");
-    place.write("photos/notes.txt", "passed over");
-    GrayImage::new(40, 40).save(place.path("photos/flat.png")).unwrap();
-    let (stdout, stderr) = place.ends("features photos", 3);
-    assert!(stdout.starts_with("4 images, "), "{stdout}");
-    assert!(stderr.ends_with("unlift: photos: expected 6 images that can be used, found 4\n"));
+#[rustfmt::skip] // One row per line.
+fn models_are_listed_and_a_missing_or_another_one_is_one_line() {
+    let place = Place::with_photos();
+    let (stdout, _) = place.ends("UNLIFT_MODELS= XDG_DATA_HOME=data models", 0);
+    assert!(stdout.contains("aliked-n16rot\n") && stdout.contains("  here     in the program\n"));
+    let missing = "superpoint.onnx: expected in data/unlift/models (https://github.com/";
+    assert!(stdout.contains(&format!("  here     no: {missing}")), "{stdout}");
+    place.write("aliked-n16rot.onnx", "another");
+    place.refuses("XDG_DATA_HOME=data features photos", &[
+        ("UNLIFT_MODELS= --features superpoint", 3, missing),
+        ("UNLIFT_MODELS=. --features aliked", 3, "unlift: ./aliked-n16rot.onnx: expected SHA-256 "),
+        ("UNLIFT_MODELS=nowhere --features aliked", 3, "unlift: UNLIFT_MODELS: expected a folder, found nowhere\n"),
+    ]);
+    assert!(!place.path("features.h5").exists());
 }

@@ -23,15 +23,3 @@ fn help_is_part_of_the_interface() {
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{command}");
     }
 }
-
-/// `NO_COLOR` disables colors (clap, indicatif). This test has no terminal, so it only checks
-/// forced colors.
-#[test]
-fn nothing_is_colored_where_it_is_not_wanted() {
-    let place = Place::empty();
-    for line in ["--help", "audit map --help", "audit map missing.ply", "schemes"] {
-        let mut program = place.program(line.split(' '));
-        let output = program.env("NO_COLOR", "1").env("CLICOLOR_FORCE", "1").output().unwrap();
-        assert!(![output.stdout, output.stderr].concat().contains(&0x1b), "{line}");
-    }
-}

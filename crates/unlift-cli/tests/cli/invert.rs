@@ -2,19 +2,12 @@
 
 use crate::common::Place;
 
-const CHEAP: &str = "--schemes lines2d --inlier-ratios 0.5 --solver consensus --k 8";
-
-fn place() -> Place {
-    Place::with_photos(&["a.png", "b/c.jpg", "d.webp"])
-}
-
 #[test]
 fn an_audit_of_images_tells_how_alike_pictures_are_and_shows_them() {
-    let place = place();
+    let place = Place::with_photos();
     let metrics = |threads: usize| {
-        let threads = format!("RAYON_NUM_THREADS={threads}");
-        let line = format!("{threads} audit images photos --invert {CHEAP} --out a");
-        place.ends(&line, 0);
+        let line = "audit images photos --invert --schemes lines2d --inlier-ratios 0.5 --solver consensus --k 8 --out a";
+        place.ends(&format!("RAYON_NUM_THREADS={threads} {line}"), 0);
         place.json("a/audit.json")["results"][0]["metrics"].clone()
     };
     let found = metrics(1);
@@ -25,15 +18,13 @@ fn an_audit_of_images_tells_how_alike_pictures_are_and_shows_them() {
     }
     assert_eq!(found["reidentified_by_chance"], 0.333333);
     assert!(found["reidentified"].is_f64() && found["reidentified_baseline"].is_f64(), "{found}");
-    let page = place.text("a/report.html");
-    assert!(page.contains("id=\"inversions\"") && page.contains("data:image/jpeg;base64,"));
     // A photo, its baseline and its recovered picture, for three images.
-    assert!(page.matches("<figure").count() >= 9);
+    assert!(place.text("a/report.html").matches("<figure").count() >= 9);
 }
 
 #[test]
 fn keypoints_and_what_came_back_are_painted_to_files() {
-    let place = place();
+    let place = Place::with_photos();
     let (stdout, _) = place.ends("invert photos --out pictures", 0);
     assert_eq!(stdout, "3 pictures, in pictures\n");
     let size = |file: &str| image::image_dimensions(place.path(file)).unwrap();
@@ -54,5 +45,5 @@ fn keypoints_and_what_came_back_are_painted_to_files() {
     place.ends(&format!("recover {released} --neighbors lists.npz --out back.npz"), 0);
     let (stdout, _) = place.ends(&format!("invert {released} back.npz --out back"), 0);
     assert_eq!(stdout, "3 pictures, in back\n");
-    assert_eq!(size("back/d.webp.png"), (64, 48));
+    assert_eq!(size("back/b/ü d.webp.png"), (64, 48));
 }

@@ -10,11 +10,7 @@ mod features;
 mod gates;
 mod help;
 mod images;
-mod inputs;
 mod invert;
-#[cfg(unix)]
-mod layouts;
-mod models;
 mod outputs;
 #[cfg(unix)]
 mod readme;

@@ -1,34 +1,48 @@
 //! Runs every command line of the README in order, in an empty folder.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use rusqlite::{Connection, params};
 use unlift::synthetic;
 use unlift_io::clouds::write_points;
 
-use crate::common::{Place, texts};
-use crate::layouts;
+use crate::common::{Place, descriptor, texts};
 
-/// Inputs of the reader; the lines must make everything else.
-const FIXTURES: [&str; 3] = ["PROJECT/", "photos/", "cloud.ply"];
+/// Creates a COLMAP project of a room: each of 600 points is seen by three images.
+fn write_project(place: &Place) {
+    let points = synthetic::room(1, 600).points;
+    let descriptors: Vec<u8> = points.iter().flat_map(|point| descriptor(point, 128)).collect();
+    place.write("PROJECT/database.db", "");
+    let database = Connection::open(place.path("PROJECT/database.db")).unwrap();
+    let tables = "CREATE TABLE images (image_id INTEGER PRIMARY KEY, name TEXT UNIQUE, camera_id INTEGER);
+         CREATE TABLE descriptors (image_id INTEGER PRIMARY KEY, rows INTEGER, cols INTEGER, data BLOB);";
+    database.execute_batch(tables).unwrap();
+    let mut images = String::new();
+    for id in 1..=3 {
+        let at = f64::from(id - 1);
+        let [x, y, z] = [-0.5 * at, -0.1 * at * at, -1.5 - 0.2 * (3.0 * at).sin()];
+        images += &format!("{id} 1 0 0 0 {x} {y} {z} 1 room/{id}.jpg\n\n");
+        let insert = "INSERT INTO images VALUES (?, ?, 1)";
+        database.execute(insert, params![id, format!("room/{id}.jpg")]).unwrap();
+        let insert = "INSERT INTO descriptors VALUES (?, 600, 128, ?)";
+        database.execute(insert, params![id, descriptors]).unwrap();
+    }
+    database.close().unwrap();
+    let line = |(at, [x, y, z]): (usize, &[f64; 3])| {
+        format!("{} {x} {y} {z} 0 0 0 0.5 1 {at} 2 {at} 3 {at}\n", at + 1)
+    };
+    let rows: String = points.iter().enumerate().map(line).collect();
+    place.write("PROJECT/sparse/0/cameras.txt", "1 SIMPLE_PINHOLE 640 480 500 320 240\n");
+    place.write("PROJECT/sparse/0/images.txt", images);
+    place.write("PROJECT/sparse/0/points3D.txt", rows);
+}
 
 /// Returns the command lines of all `sh` blocks of a document, without comments.
 fn command_lines(markdown: &str) -> impl Iterator<Item = &str> {
     let blocks = markdown.split("```sh\n").skip(1).filter_map(|block| block.split("```").next());
     let lines = blocks.flat_map(str::lines).filter_map(|line| line.split(" #").next());
     lines.map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'))
-}
-
-/// Returns the line for the program of this build; `None` for lines that build the program or run
-/// the tests.
-fn runnable(line: &str) -> Option<String> {
-    if ["cargo install --path crates/unlift-cli", "cargo test --workspace"].contains(&line) {
-        return None;
-    }
-    let line = line.replacen("cargo run --release --", "unlift", 1);
-    assert!(line.starts_with("unlift "), "this test cannot run a line of the README: {line}");
-    Some(line)
 }
 
 /// Returns the output path of a line of unlift: `--out` or the default.
@@ -46,25 +60,23 @@ fn output(line: &str) -> Option<&str> {
 fn every_command_line_of_the_readme_runs_as_it_is_written() {
     let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md");
     let readme = fs::read_to_string(readme).unwrap();
-    let lines: Vec<&str> = command_lines(&readme).collect();
+    let mut lines: Vec<&str> = command_lines(&readme).collect();
     assert!(lines.len() >= 15, "{lines:#?}");
+    // These build the program and run the tests.
+    lines.retain(|line| !line.starts_with("cargo install ") && !line.starts_with("cargo test "));
 
-    let place = Place::with_photos(&["a.jpg", "b.png", "hall/c.webp"]);
-    layouts::project(&place, "PROJECT");
-    let cloud = synthetic::room(2, 400).points.into_iter().map(|p| p.map(|x| 3.0 * x));
-    write_points(&place.path("cloud.ply"), &cloud.collect::<Vec<_>>()).unwrap();
-    let given = || -> BTreeMap<String, Vec<u8>> {
-        let of_reader = |name: &String| FIXTURES.iter().any(|given| name.starts_with(given));
-        let names = place.files().into_iter().filter(of_reader);
+    let place = Place::with_photos();
+    write_project(&place);
+    write_points(&place.path("cloud.ply"), &synthetic::room(2, 400).points).unwrap();
+    let others = |outputs: &[String]| -> Vec<(String, Vec<u8>)> {
+        let is_other = |name: &String| !outputs.iter().any(|out| name.starts_with(out));
+        let names = place.files().into_iter().filter(is_other);
         names.map(|name| (name.clone(), place.bytes(&name))).collect()
     };
-    let before = given();
-    let mut outputs: Vec<String> = Vec::new();
-    for line in lines.into_iter().filter_map(runnable) {
-        if let Some(out) = output(&line) {
-            assert!(!outputs.contains(&out.to_owned()), "two lines write {out}: {line}");
-            outputs.push(out.to_owned());
-        }
+    let (given, mut outputs) = (others(&[]), Vec::new());
+    for line in lines {
+        let line = line.replacen("cargo run --release --", "unlift", 1);
+        assert!(line.starts_with("unlift "), "this test cannot run a line of the README: {line}");
         let run = place.shell(&line);
         let (stdout, stderr) = texts(&run);
         // A gate may fail, and must report that; nothing else may fail.
@@ -72,7 +84,9 @@ fn every_command_line_of_the_readme_runs_as_it_is_written() {
         assert_eq!(run.status.code(), Some(i32::from(failed)), "{line}\n{stdout}{stderr}");
         if let Some(out) = output(&line) {
             assert!(place.path(out).exists(), "{line}");
+            assert!(!outputs.contains(&out.to_owned()), "two lines write {out}: {line}");
+            outputs.push(out.to_owned());
         }
     }
-    assert!(given() == before, "a line of the README changed what a reader has");
+    assert!(others(&outputs) == given, "a line of the README changed what a reader has");
 }

@@ -45,10 +45,11 @@ fn a_reader_that_has_enough_ends_the_output_and_a_full_disk_is_an_error() {
     }
 }
 
+/// `NO_COLOR` disables colors, also where a terminal or `CLICOLOR_FORCE` would have them.
 #[test]
 fn no_name_reaches_the_terminal_as_it_is() {
     let odd = "\x1b]0;owned\x07\u{9b}2J\u{202e}gpj\u{2028}\nunlift: done";
-    let place = Place::with_photos(&["a.png", "b.png"]);
+    let place = Place::with_photos();
     fs::rename(place.path("photos/a.png"), place.path(&format!("photos/{odd}.png"))).unwrap();
     place.write(&format!("photos/{odd}.jpg"), "no photo");
     fs::rename(place.path("photos"), place.path(odd)).unwrap();
@@ -63,7 +64,8 @@ fn no_name_reaches_the_terminal_as_it_is() {
         &["features", "gone", &format!("--{odd}")],
         &["audit", "map", odd, "--out", odd],
     ] {
-        let output = place.program(words.iter().copied()).output().expect("the program starts");
+        let mut program = place.program(words.iter().copied());
+        let output = program.env("NO_COLOR", "1").env("CLICOLOR_FORCE", "1").output().unwrap();
         let (stdout, stderr) = texts(&output);
         let text = stdout + &stderr;
         let is_obeyed = |c: &char| *c != '\n' && unlift::is_obeyed(*c);

@@ -10,12 +10,6 @@ fn the_ending_decides_what_is_written() {
         "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --quiet";
     place.ends(&format!("{audit} --neighbors oracle --neighbors geometric --out a"), 0);
     let document = place.json("a/audit.json");
-    let largest = |scheme: &str, ratio: f64, typed: &str| {
-        let of = rows(&document).iter().filter(|row| {
-            row["scheme"] == scheme && row["neighbors"] == "oracle" && row["inlier_ratio"] == ratio
-        });
-        format!("{:.1}", of.map(|row| recovered(row, typed)).fold(0.0, f64::max))
-    };
     let written = |name: &str, more: &str| {
         // A table of unlift is replaced.
         for _ in 0..2 {
@@ -24,14 +18,19 @@ fn the_ending_decides_what_is_written() {
         place.text(name)
     };
     let tex = written("t.tex", "");
-    let lines = ["olc", "ppl"].map(|scheme| {
-        let cell = |ratio| ["0.10", "0.25"].map(|typed| largest(scheme, ratio, typed)).join(" / ");
-        format!("\n{scheme} & {} & {} & ", cell(1.0), cell(0.5))
-    });
-    for expected in ["scheme & 1.0 & 0.5 & geometric & blind & records alone \\\\\n", "\\toprule", &lines[0], &lines[1]] {
-        assert!(tex.contains(expected), "{expected}\n{tex}");
+    assert!(tex.contains("scheme & 1.0 & 0.5 & geometric & blind & records alone \\\\\n"), "{tex}");
+    assert!(tex.contains(" / "), "{tex}");
+    let tex = written("t.tex", "--thresholds 0.25");
+    for scheme in ["olc", "ppl"] {
+        // The solver that recovers most counts.
+        let [all, half] = [1.0, 0.5].map(|ratio| {
+            let of = rows(&document).iter().filter(|row| {
+                row["scheme"] == scheme && row["neighbors"] == "oracle" && row["inlier_ratio"] == ratio
+            });
+            of.map(|row| recovered(row, "0.25")).fold(0.0, f64::max)
+        });
+        assert!(tex.contains(&format!("\n{scheme} & {all:.1} & {half:.1} & ")), "{tex}");
     }
-    assert!(!written("t.tex", "--thresholds 0.25").contains(" / "), "one threshold a cell");
     let csv = written("t.csv", "--thresholds 0.1");
     assert_eq!(csv.lines().count(), 1 + rows(&document).len());
     assert!(csv.contains("recovered_percent_within_0.10") && !csv.contains("_0.25"), "{csv}");
