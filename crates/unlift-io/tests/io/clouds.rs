@@ -76,6 +76,9 @@ fn tables_are_read_as_intended_or_refused_with_a_reason() {
         (any, "# x y z\n// X,Y,Z\n", "  x\ty\tz", POINTS_ONLY),
         (any, "id,Z,\"Y\",x\n", "7,z,y,x\n# between", POINTS_ONLY),
         (any, "name\tx\ty\tz\n", "\tx\ty\tz", POINTS_ONLY),
+        (any, "sep=,\n\"x\",\"y\",\"z\"\n", "\"x\",\"y\",\"z\"", POINTS_ONLY),
+        (any, "\"Points:0\",\"Points:1\",\"Points:2\"\n", "x,y,z", POINTS_ONLY),
+        (any, "Intensity,Points_0,Points_1,Points_2\n", "i,x,y,z", POINTS_ONLY),
         (any, "X Y Z R G B\n", "x y z 1 2 3", POINTS_ONLY),
         (any, "\u{feff}x;y;z\n", "x;y;z", POINTS_ONLY),
         // Comments name the columns.

@@ -11,7 +11,7 @@ use unlift::seed::{Draws, Stage};
 use unlift_io::features::{FeatureWriter, ImageFeatures, round_to_half};
 use unlift_io::read::{self, Input};
 
-use super::malformed::{MANY, appended, patched};
+use super::malformed::{MANY, patched};
 use super::{data, fixture, npy, place, shown, write, write_database};
 
 #[test]
@@ -267,10 +267,10 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
     let good = fixture("project/descriptors.bin");
     let input = read::open(&data("project")).unwrap();
     let header = || good[..24 + 6 * 8].to_vec();
-    let halves = |half: f16| appended(patched(header(), 20, &[2]), &half.to_le_bytes().repeat(6 * 128));
+    let halves = |half: f16| [patched(header(), 20, &[2]), half.to_le_bytes().repeat(6 * 128)].concat();
     let bytes = |what, bytes, line| (what, Ok::<Vec<u8>, &str>(bytes), line);
     let sql = |what, statement, line| (what, Err(statement), line);
-    let zeros = appended(header(), &[0; 6 * 128]);
+    let zeros = [header(), vec![0; 6 * 128]].concat();
     // The bytes of a file, or a statement that is run on the database.
     let rows = vec![
         bytes("empty", vec![], "d: expected a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5), found an empty file"),

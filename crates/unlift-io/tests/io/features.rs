@@ -8,7 +8,8 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
-use super::{data, place, shown, write, write_database};
+use super::malformed::patched;
+use super::{data, fixture, place, shared, shown, write, write_database};
 
 fn made(name: &str, n: usize) -> ImageFeatures {
     let values = |factor: f32| (0..n).map(|at| factor * at as f32).collect();
@@ -192,6 +193,8 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         file(&others.chain([(name, shape, step)]).collect::<Vec<_>>())
     };
     let good = file(&[KEYPOINTS, DESCRIPTORS]);
+    let mut outside = FileBuilder::new();
+    outside.create_dataset("keypoints").with_f32_data(&[1.0, 2.0]);
     let rows: Vec<(&str, Vec<u8>, &str)> = vec![
         ("good", good.clone(), "good"),
         ("empty", vec![], "f: expected features in HDF5, or a COLMAP database (SQLite), found an empty file"),
@@ -199,6 +202,9 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         ("no image", FileBuilder::new().finish().unwrap(), "f: expected at least one image, found none"),
         ("no keypoints", file(&[DESCRIPTORS]), "f: image \"a.jpg\": expected an array keypoints, found only descriptors"),
         ("global descriptors", file(&[("global_descriptor", &[2], Some(0.5))]), "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
+        ("matches", file(&[("matches0", &[2], Some(0.5))]), "f: expected a group per image with keypoints and descriptors, found matches of pairs of images"),
+        ("outside any group", outside.finish().unwrap(), "f: expected a group per image with keypoints and descriptors, found arrays outside any group"),
+        ("not closed by its writer", patched(fixture("features-latest.h5"), 11, &[1]), "f: expected a whole HDF5 file, found one that its writer did not close (h5clear -s FILE)"),
         ("no descriptors", file(&[KEYPOINTS]), "f: image \"a.jpg\": expected descriptors, found none"),
         ("keypoints in one column", with("keypoints", &[3, 1], Some(1.0)), "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),
         ("infinite", with("keypoints", &[3, 2], Some(f32::INFINITY)), "f: image \"a.jpg\", keypoints: expected finite coordinates in row 0, found (inf, inf)"),
@@ -263,4 +269,19 @@ fn a_link_in_a_group_of_the_old_form_is_refused_with_a_way_out() {
     }
     let line = line(&file);
     assert!(line.ends_with("in the old form (write it with libver=\"latest\" of h5py)"), "{line}");
+}
+
+#[test]
+fn features_are_read_through_links_and_without_keypoints() {
+    let Some(field) = shared("field/f15-other-h5") else { return };
+    let links = FeatureSource::open(&field.join("links.h5")).unwrap();
+    assert_eq!(links.names(), ["a.jpg", "b.jpg"]);
+    assert_eq!(links.get(1).unwrap().keypoints.len(), 300);
+    let [broken] = links.refused() else { panic!("{:?}", links.refused()) };
+    let line = shown(&field, broken);
+    let expected = "expected features of an image, found a link to another file";
+    assert_eq!(line, format!("links.h5: image \"c.jpg\": {expected}"));
+    let empty = FeatureSource::open(&field.join("empty_image.h5")).unwrap();
+    assert_eq!(empty.names().len(), 3);
+    assert!((0..3).all(|at| empty.get(at).unwrap().keypoints.is_empty()));
 }

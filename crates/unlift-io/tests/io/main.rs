@@ -3,7 +3,6 @@
 mod clouds;
 mod descriptors;
 mod features;
-mod field;
 mod malformed;
 mod models;
 mod others;

@@ -16,11 +16,6 @@ pub fn patched(mut file: Vec<u8>, at: usize, bytes: &[u8]) -> Vec<u8> {
     file
 }
 
-pub fn appended(mut file: Vec<u8>, bytes: &[u8]) -> Vec<u8> {
-    file.extend(bytes);
-    file
-}
-
 /// A count that exceeds any file.
 pub const MANY: [u8; 8] = 1_000_000_000_000_000_000_u64.to_le_bytes();
 
@@ -103,7 +98,7 @@ fn binary() -> Vec<Row> {
     vec![
         in_model("cut in the count", "points3D.bin", points()[..5].to_vec(), ": header (byte 0): expected 8 bytes of the number of points, found 5 bytes before the end of the file"),
         in_model("track of 10^18", "points3D.bin", patched(points(), 51, &MANY), ": record 1 (byte 51): expected at most 46 for the number of observations (375 bytes are left), found 1000000000000000000"),
-        in_model("trailing byte", "points3D.bin", appended(points(), b"x"), ": record 6 (byte 434): expected end of file, found 1 byte more"),
+        in_model("trailing byte", "points3D.bin", [points(), b"x".to_vec()].concat(), ": record 6 (byte 434): expected end of file, found 1 byte more"),
         in_model("repeated id", "points3D.bin", patched(points(), 8, &[3]), ": point 3: expected each id once, found it again"),
         in_model("text where binary is expected", "points3D.bin", b"# 3D point list\n1 0 0 0 0 0 0 0\n".to_vec(), ": header (byte 0): expected binary data (the number of points), found text"),
         in_model("name without end", "images.bin", patched(images(), 72, &name_to_end), ": record 1 (byte 830): expected 1 byte of image name, found end of file"),
@@ -124,6 +119,7 @@ fn text() -> Vec<Row> {
     vec![
         points("two coordinates", "# c\n1 2 3\n", ":2: expected 3 coordinates, found end of line"),
         points("long word", &long, ":1: expected 3 coordinates, found \"9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a...\""),
+        points("NaN", "7 NaN 0 0 0 0 0 0\n", ": expected a point with a place, found 1 without one"),
         points("no error", "7 0 0 0 0 0 0\n", ":1: expected a reprojection error, found end of line"),
         points("half an observation", "7 0 0 0 0 0 0 0 1 2 3\n", ":1: expected observations of 2 numbers (image id, 2D point), found 3 numbers"),
         points("binary where text is expected", "\u{6}\0\0\0\0\0\0\0\u{2}\0\0\n", ":1: expected text, found binary data"),
@@ -154,6 +150,7 @@ fn ply() -> Vec<Row> {
         ply("not a PLY file", b"solid cube\n".to_vec(), ":1: expected \"ply\", as every PLY file begins, found \"solid cube\""),
         ply("unknown format", file("binary", "", b""), ":2: expected ascii, binary_little_endian or binary_big_endian, found \"binary\""),
         ply("no vertices", file("ascii", "element face 1\n", b""), ": header: expected an element vertex, found none"),
+        ply("packed splats", file("binary_little_endian", "element vertex 1\nproperty uint packed_position\n", &[0; 4]), ": header: expected x, y and z, found packed splats (export them unpacked)"),
         ply("unknown type", file("ascii", "element vertex 1\nproperty half x\n", b""), ":4: expected the type of a property, found \"half\""),
         ply("negative count", ascii("-1", ""), ":3: expected the number of elements, found \"-1\""),
         ply("list before vertex: cut", file("binary_big_endian", &list_before, &[20; 13]), ": record 1 (byte 154): expected 80 bytes of a list, found 12 bytes before the end of the file"),
@@ -211,38 +208,26 @@ fn paths() -> Vec<Row> {
     ]
 }
 
-/// A kind of input.
-#[derive(Clone, Copy, PartialEq)]
-enum Input {
-    /// A map that cannot be read without its last byte.
-    Map,
-    /// A map that may end anywhere.
-    Text,
-    Descriptors,
-    Features,
-    /// A released map, which checksums protect.
-    Stage,
-}
-
-/// Inputs: a folder of fixtures or none, a file in it, its kind. The model in `rig-bin` has rigs and frames.
-const INPUTS: [(&str, &str, Input); 17] = [
-    (MODEL, "cameras.bin", Input::Text),
-    (MODEL, "images.bin", Input::Map),
-    ("rig-bin", "points3D.bin", Input::Map),
-    ("rig-txt", "cameras.txt", Input::Text),
-    ("rig-txt", "images.txt", Input::Text),
-    ("rig-txt", "points3D.txt", Input::Text),
-    ("", "cloud.ply", Input::Map),
-    ("", "f8-fortran.npy", Input::Map),
-    ("", "bundle.out", Input::Text),
-    ("", "scene.nvm", Input::Text),
-    ("", "reconstruction.json", Input::Map),
-    ("", "table.csv", Input::Text),
-    ("project", "descriptors.bin", Input::Descriptors),
-    ("project", "database.db", Input::Descriptors),
-    ("", "features-latest.h5", Input::Features),
-    ("", "features-earliest.h5", Input::Features),
-    ("", "released.npz", Input::Stage),
+/// Inputs: a folder of fixtures or none, a file in it, and whether it cannot be read without its last byte. The model in
+/// `rig-bin` has rigs and frames. Checksums protect a released map.
+const INPUTS: [(&str, &str, bool); 17] = [
+    (MODEL, "cameras.bin", false),
+    (MODEL, "images.bin", true),
+    ("rig-bin", "points3D.bin", true),
+    ("rig-txt", "cameras.txt", false),
+    ("rig-txt", "images.txt", false),
+    ("rig-txt", "points3D.txt", false),
+    ("", "cloud.ply", true),
+    ("", "f8-fortran.npy", true),
+    ("", "bundle.out", false),
+    ("", "scene.nvm", false),
+    ("", "reconstruction.json", true),
+    ("", "table.csv", false),
+    ("project", "descriptors.bin", false),
+    ("project", "database.db", false),
+    ("", "features-latest.h5", false),
+    ("", "features-earliest.h5", false),
+    ("", "released.npz", true),
 ];
 
 fn bytes_of(folder: &str, name: &str) -> Vec<u8> {
@@ -260,18 +245,19 @@ fn bytes_of(folder: &str, name: &str) -> Vec<u8> {
     }
 }
 
-/// Reads an input. Errors must be one line. Returns true on success.
-fn reads(kind: Input, dir: &Path, path: &Path, map: &read::Input) -> bool {
-    let result = match kind {
-        Input::Map | Input::Text => {
+/// Reads the input `name` in `dir`. Errors must be one line. Returns true on success.
+fn reads(dir: &Path, name: &str, map: &read::Input) -> bool {
+    let path = &dir.join(name);
+    let result = match name {
+        "descriptors.bin" | "database.db" => read::descriptors(path, map).map(drop),
+        "released.npz" => stage::read_released::<3>(path).map(drop),
+        _ if name.ends_with(".h5") => FeatureSource::open(path).and_then(|source| {
+            (0..source.names().len()).try_for_each(|at| source.get(at).map(drop))
+        }),
+        _ => {
             let is_model = ["points3D.bin", "points3D.txt"].iter().any(|of| dir.join(of).exists());
             read::open(if is_model { dir } else { path }).map(drop)
         }
-        Input::Descriptors => read::descriptors(path, map).map(drop),
-        Input::Stage => stage::read_released::<3>(path).map(drop),
-        Input::Features => FeatureSource::open(path).and_then(|source| {
-            (0..source.names().len()).try_for_each(|at| source.get(at).map(drop))
-        }),
     };
     result.as_ref().err().is_none_or(|error| {
         let line = shown(dir, error);
@@ -283,15 +269,14 @@ fn reads(kind: Input, dir: &Path, path: &Path, map: &read::Input) -> bool {
 #[test]
 fn inputs_that_are_cut_or_changed_anywhere_are_read_or_refused() {
     let map = read::open(&data("project")).unwrap();
-    for (folder, name, kind) in INPUTS {
+    for (folder, name, is_whole) in INPUTS {
         let dir = tempfile::tempdir().unwrap();
-        if !folder.is_empty() && kind != Input::Descriptors {
+        if !folder.is_empty() {
             copy_folder(&data(folder), dir.path());
         }
-        let path = dir.path().join(name);
-        let original = bytes_of(folder, name);
+        let (path, original) = (dir.path().join(name), bytes_of(folder, name));
         fs::write(&path, &original).unwrap();
-        assert!(reads(kind, dir.path(), &path, &map), "{folder}/{name}");
+        assert!(reads(dir.path(), name, &map), "{folder}/{name}");
         // A part of the bytes of large files, to finish within seconds.
         let places = || (0..original.len()).step_by(original.len().div_ceil(400));
         let mut file = File::options().write(true).open(&path).unwrap();
@@ -300,14 +285,13 @@ fn inputs_that_are_cut_or_changed_anywhere_are_read_or_refused() {
                 file.seek(SeekFrom::Start(at as u64)).unwrap();
                 file.write_all(&[other]).unwrap();
                 if other != original[at] {
-                    reads(kind, dir.path(), &path, &map);
+                    reads(dir.path(), name, &map);
                 }
             }
         }
         for n in places().rev() {
             file.set_len(n as u64).unwrap();
-            let opens = reads(kind, dir.path(), &path, &map);
-            let is_whole = [Input::Map, Input::Stage].contains(&kind);
+            let opens = reads(dir.path(), name, &map);
             assert!(!opens || !is_whole, "{folder}/{name} cut at {n} opens");
         }
     }

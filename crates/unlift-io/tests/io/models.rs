@@ -39,6 +39,13 @@ fn model_folders_open_with_centers_ids_and_files() {
         let sum = [-14.46619668331794, -9.942024018235283, -17.581669871119047];
         close(total(&map.positions), sum, 1e-12);
     }
+    let dir = tempfile::tempdir().unwrap();
+    copy_folder(&data("rig-txt"), dir.path());
+    fs::rename(dir.path().join("points3D.txt"), dir.path().join("unused.txt")).unwrap();
+    fs::copy(data("cloud.ply"), dir.path().join("points3D.ply")).unwrap();
+    let map = read::open(dir.path()).unwrap();
+    assert_eq!((map.positions.len(), map.cameras.len()), (8, 20));
+    assert_eq!(map.notes, ["points3D.ply: read (no points3D.bin, no points3D.txt)"]);
     let alone = read::open(&data("rig-bin/points3D.bin")).unwrap();
     assert_eq!(alone.positions, read::open(&data("rig-bin")).unwrap().positions);
 }
@@ -151,6 +158,7 @@ fn descriptors_of_a_project_are_found_from_its_model_as_well() {
 fn cameras_are_not_needed_for_points() {
     for (file, from, to, note) in [
         ("cameras.txt", "SIMPLE_PINHOLE", "SPHERICAL", "expected a camera model of COLMAP for camera"),
+        ("cameras.txt", "\n1 SIMPLE_PINHOLE", "\n99 SIMPLE_PINHOLE", "2 of 20 images name a camera that is not in cameras.txt"),
         // A pose with NaN, and one of zeros.
         ("images.txt", "\n3 0.2448454332437206 ", "\n3 nan ", "1 of 20 cameras have no place"),
         ("images.txt", "\n2 0.69121825575770734 0.46875053236901132 0.54926565388881932 -0.028240091521257206", "\n2 0 0 0 0", "1 of 20 cameras have no place"),

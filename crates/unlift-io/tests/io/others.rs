@@ -52,11 +52,18 @@ fn every_form_gives_the_same_points_and_cameras() {
     let folder = tempfile::tempdir().unwrap();
     let small = r#"{"shots": {}, "points": {"1": {"coordinates": [1, 2, 3]}}}"#;
     let several = format!("[{small}, {OPENSFM}]");
+    let models = NVM.replacen(
+        "\n\n",
+        "\n1\na 1 1 0 0 0 0 0 0 0 0\n1\n9 9 9\n1\nb 1 1 0 0 0 0 0 0 0 0\n0\n",
+        1,
+    );
+    let of_models = "read, the largest of 2 models (3 points)1 photos without a pose";
     fs::create_dir(folder.path().join("nerf")).unwrap();
     fs::write(folder.path().join("nerf/sparse_pc.ply"), PLY).unwrap();
     for (name, text, format, note) in [
         ("bundler/bundle.out", BUNDLER, "Bundler", "1 of 3 cameras have no place"),
         ("nvm/scene.nvm", NVM, "NVM", ""),
+        ("nvm/models.nvm", &models, "NVM", of_models),
         (
             "sfm/reconstruction.json",
             &several,
