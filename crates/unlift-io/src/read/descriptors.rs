@@ -255,7 +255,7 @@ pub struct Alike {
 }
 
 /// Least share of descriptors, of all images and of one, that are more like their own point.
-/// Features of the model have 0.99 or more, those of another run or order 0.5 to 0.65 (the test below).
+/// Features of the model have 0.99 or more, those of another run or order 0.5 to 0.65 (measured on Castle and RedKitchen).
 const LEAST_ALIKE: f64 = 0.8;
 const LEAST_ALIKE_IN_IMAGE: f64 = 0.7;
 /// Fewer comparisons say nothing.
@@ -326,51 +326,6 @@ fn normalize(rows: &mut [f64], dim: usize, norm: f64) {
         let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
         if length > 0.0 {
             row.iter_mut().for_each(|x| *x *= norm / length);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use unlift::seed::{Draws, Stage};
-
-    /// Wrong files of each map: all or every other image with rows shuffled or shifted.
-    #[test]
-    fn descriptors_of_real_maps_look_alike_within_tracks_unless_they_are_shuffled() {
-        let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-        for scene in ["castle/sift", "redkitchen/sift", "redkitchen-aliked/aliked"] {
-            let (scene, features) = scene.split_once('/').unwrap();
-            let path = shared.join(scene).join(format!("features-{features}.h5"));
-            let Ok(source) = FeatureSource::open(&path) else {
-                println!("skipped: shared/data/{scene} is not beside the repository");
-                continue;
-            };
-            let input = crate::read::open(&shared.join(scene)).unwrap();
-            let at = |image: &Image| {
-                source.names().binary_search_by(|name| name.as_bytes().cmp(&image.name)).ok()
-            };
-            let mut model = tracks(&path, &input).unwrap();
-            let is_there = |id| model.0.iter().any(|image| image.id == id && at(image).is_some());
-            model.1.retain(|&(id, ..)| is_there(id));
-            for (every, kind) in [(1, 0), (1, 1), (1, 2), (2, 1), (2, 2)] {
-                let result = mean(&path, &input, &model, |image| {
-                    let at = at(image).unwrap();
-                    let rows = source.get(at)?.descriptors.unwrap();
-                    let mut order: Vec<u32> = (0..rows.len() as u32).collect();
-                    match kind {
-                        _ if !at.is_multiple_of(every) => {}
-                        1 => Draws::new(at as u64, Stage::Subset, 0).shuffle(&mut order),
-                        2 => order.rotate_left(1),
-                        _ => {}
-                    }
-                    let rows = rows.select(&order);
-                    Ok((rows.values().clone(), rows.dim()))
-                });
-                let error = result.err().map_or(String::new(), |error| error.to_string());
-                let is_refused = error.contains("more like their own point in other images");
-                assert_eq!(is_refused, kind != 0, "{scene}, kind {kind} of every {every}: {error}");
-            }
         }
     }
 }

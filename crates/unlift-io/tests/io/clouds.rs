@@ -226,11 +226,10 @@ fn arrays_may_have_more_columns_or_names() {
     let input = open("a.npy", npy("'<f4'", "(3, 6)", &six));
     assert_eq!(input.positions, POINTS);
     assert_eq!(input.notes, ["the first 3 of 6 columns are read as x, y and z"]);
-    let halves = bytes([0.5, 1.0, 2.0], |x| f16::from_f64(x).to_le_bytes());
-    assert_eq!(open("a.npy", npy("'<f2'", "(1, 3)", &halves)).positions, [[0.5, 1.0, 2.0]]);
     let signed = [-100.0, -1.0, 2.0];
     let (unsigned, large) = ([65236.0, 1.0, 2.0], [9_223_372_036_854_775_808.0, 1.0, 2.0]);
     for (descr, values, whole) in [
+        ("'<f2'", signed, bytes(signed, |x| f16::from_f64(x).to_le_bytes())),
         ("'|i1'", signed, bytes(signed, |x| (x as i8).to_le_bytes())),
         ("'<i2'", signed, bytes(signed, |x| (x as i16).to_le_bytes())),
         ("'>i2'", signed, bytes(signed, |x| (x as i16).to_be_bytes())),
@@ -243,8 +242,7 @@ fn arrays_may_have_more_columns_or_names() {
     }
 
     let row = |[x, y, z]: [f64; 3]| {
-        let parts = [vec![9; 3], (z as f32).to_be_bytes().into(), x.to_le_bytes().into(), vec![0; 8], f4(y).into()];
-        parts.concat()
+        [vec![9; 3], (z as f32).to_be_bytes().into(), x.to_le_bytes().into(), vec![0; 8], f4(y).into()].concat()
     };
     let rows = POINTS.map(row).concat();
     let descr = "[('rgb', '|u1', (3,)), ('Z', '>f4'), ('x', '<f8'), ('', '|V4'), ('s', '<U1'), ('y', '<f4')]";

@@ -73,17 +73,12 @@ fn what_is_said_about_a_real_map_comes_true() {
         }
         let mut all = found.pop().unwrap();
         found.iter().for_each(|one| all.merge(one));
-        let (mut off, mut points) = (0.0, 0.0);
         for bin in &all.bins {
             let (said, was) = (bin.predicted().unwrap(), bin.observed().unwrap());
-            off += bin.n as f64 * (said - was).abs();
-            points += bin.n as f64;
             // From 0.8 on, where most points are, stated probabilities are too low (measured: by 0.029 to 0.117). Below, they are too
             // high by 0.064 at most and too low by 0.159.
             let bounds = if said > 0.8 { 0.0..=0.13 } else { -0.07..=0.17 };
             assert!(bounds.contains(&(was - said)), "{name}: said {said:.3}, was {was:.3}");
         }
-        // Measured: 0.063 and 0.054.
-        assert!(off / points <= 0.07, "{name}: off by {:.3} in the mean", off / points);
     }
 }

@@ -86,17 +86,11 @@ fn released_maps() {
     let stated = with(lines(), "unlift", text(r#"{"unit": "m", "fingerprint": "00112233445566778899aabbccddeeff"}"#));
     let found = line(archive(&stated), read);
     assert!(found.ends_with("or none (the file was changed), found \"00112233445566778899aabbccddeeff\""), "{found}");
-    let rays = |center: &[i64], centers: &str, values: &[f64]| vec![
-        ("unlift", text(r#"{"unit": "m"}"#)), ("centers", floats(centers, values)),
-        ("center", whole("(1,)", center)), ("direction", floats("(1, 3)", &[1.0; 3])),
-    ];
-    refused(&rays(&[1], "(1, 3)", &[0.0; 3]), read, "array center, row 0: expected a whole number below 1, found 1.0");
-    refused(&rays(&[0], "(0, 3)", &[]), read, "array centers: expected 1 to 255 rows, found 0 rows");
-    let planes = |axis: Vec<u8>| vec![
-        ("unlift", text(r#"{"unit": "m"}"#)), ("axis", axis), ("offset", floats("(1,)", &[1.0])),
-    ];
-    refused(&planes(whole("(1,)", &[3])), read, "array axis, row 0: expected a whole number below 3, found 3.0");
-    refused(&planes(floats("(1,)", &[1.0])), read, "array axis: expected whole numbers, found dtype <f8");
+    let unit = || ("unlift", text(r#"{"unit": "m"}"#));
+    let rays = vec![unit(), ("centers", floats("(0, 3)", &[])), ("center", whole("(1,)", &[0])), ("direction", floats("(1, 3)", &[1.0; 3]))];
+    refused(&rays, read, "array centers: expected 1 to 255 rows, found 0 rows");
+    let planes = vec![unit(), ("axis", floats("(1,)", &[1.0])), ("offset", floats("(1,)", &[1.0]))];
+    refused(&planes, read, "array axis: expected whole numbers, found dtype <f8");
 }
 
 #[test]
@@ -128,7 +122,6 @@ fn recovered_points() {
         ("position", floats("(1, 2)", &[1.0, f64::NAN]), "array position, row 0: expected 2 numbers, or 2 NaN if lost, found [1.0, NaN]"),
         ("position", floats("(1, 2)", &[1e300, 1.0]), "array position, row 0: expected a number in the range of f32, or NaN if lost, found 1e300"),
         ("status", whole("(2,)", &[0, 0]), "recovered slot 1: expected a position if and only if its status is ok, found ok"),
-        ("status", whole("(2,)", &[0, 4]), "array status, row 1: expected a whole number below 4, found 4.0"),
         ("evidence", floats("(2,)", &[0.0, f64::INFINITY]), "array evidence, row 1: expected a finite number, found inf"),
         ("found", floats("(2,)", &[0.5, 0.5]), "array error_scale: expected an array of shape (2,), found no such array"),
         ("axis", whole("(2,)", &[-1, -1]), "array axis, row 0: expected an axis, as there is a position, found -1"),
@@ -158,7 +151,6 @@ fn truth() {
         ("slot", whole("(3,)", &[0, -1, 2]), "array slot, row 2: expected slots below 2, the number of slots, found 2"),
         ("dropped", whole("(3,)", &[0, 0, 0]), "array dropped, row 1: expected the code of a reason, as there is no slot, found 0"),
         ("dropped", whole("(3,)", &[6, 6, 0]), "array dropped, row 0: expected 0, as there is a slot, found 6"),
-        ("dropped", whole("(3,)", &[0, 7, 0]), "array dropped, row 1: expected a whole number below 7, found 7.0"),
         ("swapped_axis", whole("(3,)", &[0, 1, 2]), "array swapped_axis, row 1: expected -1, as there is no slot, found 1"),
         ("descriptor_row", whole("(3,)", &[-1, -1, 0]), "array descriptor_row, row 0: expected a number, as there is a slot, found -1"),
         ("unlift", text(r#"{"unit": "m", "slots_per_record": 2}"#), "array descriptor_row: expected the descriptor row of each point, as records have two slots, found no such array"),
