@@ -177,11 +177,11 @@ pub(crate) mod tests {
     #[test]
     fn two_runs_do_not_write_one_file() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.bin");
-        let first = OutputFile::create(&path, Access::Usual).unwrap();
-        let error = OutputFile::create(&path, Access::Usual).unwrap_err().to_string();
+        let create = || OutputFile::create(&folder.path().join("a.bin"), Access::Usual);
+        let first = create().unwrap();
+        let error = create().unwrap_err().to_string();
         assert!(error.ends_with("expected no other run that writes it, found one in progress"));
         first.commit().unwrap();
-        OutputFile::create(&path, Access::Usual).unwrap().commit().unwrap();
+        create().unwrap().commit().unwrap();
     }
 }

@@ -134,40 +134,30 @@ mod tests {
 
     use crate::read::colmap::{CAMERA_MODELS, read_points, read_views};
 
-    /// Rotations about each axis and an oblique one, including half turns.
-    fn rotations() -> Vec<[[f64; 3]; 3]> {
-        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.48, 0.64]];
-        let angles = [0.0, 0.3, 1.9, std::f64::consts::PI, 4.5];
-        let of = |[x, y, z]: [f64; 3]| Pose::IDENTITY.moved(&[x, y, z, 0.0, 0.0, 0.0]).rotation;
-        axes.iter().flat_map(|axis| angles.map(|angle| of(axis.map(|x| angle * x)))).collect()
-    }
-
     #[test]
     fn a_model_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        let cameras = vec![Camera {
-            id: 3,
-            model: &CAMERA_MODELS[2],
-            width_px: 640,
-            height_px: 480,
-            params: vec![525.25, 320.0, 240.0, -0.01],
-        }];
-        let image = |(at, rotation): (usize, [[f64; 3]; 3])| Image {
+        let (model, params) = (&CAMERA_MODELS[2], vec![525.25, 320.0, 240.0, -0.01]);
+        let cameras = vec![Camera { id: 3, model, width_px: 640, height_px: 480, params }];
+        // Rotations about each axis and an oblique one, including half turns.
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.48, 0.64]];
+        let angles = [0.0, 0.3, 1.9, std::f64::consts::PI, 4.5];
+        let turns = axes.iter().flat_map(|axis| angles.map(|angle| axis.map(|x| angle * x)));
+        let image = |(at, [x, y, z]): (usize, [f64; 3])| Image {
             id: at as u32 + 1,
             name: format!("seq/{at}.png").into_bytes(),
             camera_id: 3,
-            pose: Pose { rotation, center: [1.5 * at as f64, -2.0, 0.25] },
+            pose: Pose::IDENTITY.moved(&[x, y, z, 1.5 * at as f64, -2.0, 0.25]),
             n_points2d: 0,
         };
-        let images: Vec<Image> = rotations().into_iter().enumerate().map(image).collect();
+        let images: Vec<Image> = turns.enumerate().map(image).collect();
         let points = [Some([1.0, 2.5, -1e-7]), None, Some([1e6, 0.1, 3.0])];
         write_cameras(&at("cameras.txt"), &cameras).unwrap();
         write_images(&at("images.txt"), &images).unwrap();
         write_model_points(&at("points3D.txt"), &points).unwrap();
         let (read_cameras, read_images) = read_views(folder.path()).unwrap();
-        assert_eq!(read_cameras, cameras);
-        assert_eq!(read_images.len(), images.len());
+        assert_eq!((read_cameras, read_images.len()), (cameras, images.len()));
         let numbers = |pose: &Pose| [pose.rotation.as_flattened(), &pose.center].concat();
         for (read, written) in read_images.iter().zip(&images) {
             assert_eq!((read.id, &read.name), (written.id, &written.name));
@@ -176,18 +166,18 @@ mod tests {
             assert!(a.iter().zip(&b).all(near), "{read:?} {written:?}");
         }
         let read = read_points(&at("points3D.txt"), false).unwrap();
-        assert_eq!(read.ids, [1, 3]);
-        assert_eq!(read.positions, [[1.0, 2.5, -1e-7], [1e6, 0.1, 3.0]]);
+        assert_eq!(
+            (read.ids, read.positions),
+            (vec![1, 3], points.into_iter().flatten().collect())
+        );
     }
 
     #[test]
     fn names_that_a_line_cannot_hold_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        for name in [&b"a b.png"[..], b"", b"a\n9 1 0 0 0 0 0 0 1 b"] {
-            let (name, pose) = (name.to_vec(), Pose::IDENTITY);
+        for name in ["a b.png", "", "a\n9 1 0 0 0 0 0 0 1 b"] {
+            let (name, pose) = (name.into(), Pose::IDENTITY);
             let image = Image { id: 7, name, camera_id: 1, pose, n_points2d: 0 };
-            let error = write_images(&folder.path().join("images.txt"), &[image]);
-            let error = error.unwrap_err().to_string();
+            let error = write_images(Path::new("images.txt"), &[image]).unwrap_err().to_string();
             assert!(error.contains("image 7: expected a name without spaces"), "{error}");
         }
     }

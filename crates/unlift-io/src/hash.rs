@@ -99,8 +99,6 @@ mod tests {
         assert_eq!(hash_files(&[&a, &b]).unwrap(), expected);
         assert_eq!(hash_files(&[&b, &a]).unwrap(), expected);
         assert_ne!(hash_files(&[&a]).unwrap(), hash_files(&[&c]).unwrap());
-        let error = hash_files(&["missing.bin"]).unwrap_err().to_string();
-        assert_eq!(error, "missing.bin: expected a file or folder, found nothing");
     }
 
     #[test]

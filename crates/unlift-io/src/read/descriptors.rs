@@ -255,7 +255,7 @@ pub struct Alike {
 }
 
 /// Least share of descriptors, of all images and of one, that are more like their own point.
-/// Features of the model have 0.99 or more, those of another run or order 0.5 to 0.65 (the test below).
+/// Features of the model have 0.99 or more, those of another run or order 0.5 to 0.65 (measured on Castle and RedKitchen).
 const LEAST_ALIKE: f64 = 0.8;
 const LEAST_ALIKE_IN_IMAGE: f64 = 0.7;
 /// Fewer comparisons say nothing.
@@ -326,59 +326,6 @@ fn normalize(rows: &mut [f64], dim: usize, norm: f64) {
         let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
         if length > 0.0 {
             row.iter_mut().for_each(|x| *x *= norm / length);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use unlift::seed::{Draws, Stage};
-
-    /// Four wrong files of each map: all or every other image with rows shuffled or shifted.
-    #[test]
-    fn descriptors_of_real_maps_look_alike_within_tracks_unless_they_are_shuffled() {
-        for (scene, features) in [
-            ("castle", "features-sift.h5"),
-            ("redkitchen", "features-sift.h5"),
-            ("redkitchen-aliked", "features-aliked.h5"),
-        ] {
-            let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-            let path = shared.join(scene).join(features);
-            if !path.exists() {
-                println!("skipped: shared/data/{scene}/{features} is not beside the repository");
-                continue;
-            }
-            let input = crate::read::open(&shared.join(scene)).unwrap();
-            let source = FeatureSource::open(&path).unwrap();
-            let names = source.names();
-            let at = |image: &Image| names.iter().position(|name| name.as_bytes() == image.name);
-            let (images, mut observations) = tracks(&path, &input).unwrap();
-            let is_there = |id| images.iter().any(|image| image.id == id && at(image).is_some());
-            observations.retain(|&(id, ..)| is_there(id));
-            let model = (images, observations);
-            let all = (0..names.len()).map(|at| source.get(at).unwrap().descriptors);
-            let all: Vec<Descriptors> = all.map(Option::unwrap).collect();
-            for (&every, kind) in [1, 2].iter().flat_map(|n| (0..3).map(move |kind| (n, kind))) {
-                let changed = |at: usize| {
-                    let mut rows: Vec<u32> = (0..all[at].len() as u32).collect();
-                    match kind {
-                        _ if !at.is_multiple_of(every) => {}
-                        1 => Draws::new(at as u64, Stage::Subset, 0).shuffle(&mut rows),
-                        2 => rows.rotate_left(1),
-                        _ => {}
-                    }
-                    all[at].select(&rows)
-                };
-                let changed: Vec<Descriptors> = (0..all.len()).map(changed).collect();
-                let result = mean(&path, &input, &model, |image| {
-                    let stored = &changed[at(image).unwrap()];
-                    Ok((stored.values().clone(), stored.dim()))
-                });
-                let error = result.err().map_or(String::new(), |error| error.to_string());
-                let is_refused = error.contains("more like their own point in other images");
-                assert_eq!(is_refused, kind != 0, "{scene}, kind {kind} of every {every}: {error}");
-            }
         }
     }
 }

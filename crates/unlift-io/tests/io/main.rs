@@ -3,7 +3,6 @@
 mod clouds;
 mod descriptors;
 mod features;
-mod field;
 mod malformed;
 mod models;
 mod others;
@@ -82,19 +81,18 @@ fn total(rows: &[[f64; 3]]) -> [f64; 3] {
 }
 
 fn close(found: [f64; 3], expected: [f64; 3], tolerance: f64) {
-    let near = |(a, b): (f64, f64)| (a - b).abs() <= tolerance;
-    let all = found.into_iter().zip(expected).all(near);
-    assert!(all, "{found:?}, expected {expected:?}");
+    let is_near = |axis: usize| (found[axis] - expected[axis]).abs() <= tolerance;
+    assert!((0..3).all(is_near), "{found:?}, expected {expected:?}");
 }
 
 /// Returns a file beside the repository, or `None` with a message.
 fn shared(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(name);
-    if !path.exists() {
+    let found = path.exists().then_some(path);
+    if found.is_none() {
         println!("skipped: shared/{name} is not beside the repository");
-        return None;
     }
-    Some(path)
+    found
 }
 
 /// An `.npy` file. Its values begin at byte 128 unless the type is long.

@@ -29,21 +29,25 @@ fn binary_and_text_models_are_equal() {
 
 #[test]
 fn model_folders_open_with_centers_ids_and_files() {
-    let bin = read::open(&data("rig-bin")).unwrap();
-    let txt = read::open(&data("rig-txt")).unwrap();
-    assert_eq!(bin.positions, txt.positions);
-    assert_eq!(bin.cameras, txt.cameras);
-    assert_eq!((bin.format, txt.format), ("COLMAP binary", "COLMAP text"));
-    assert_eq!((bin.files.len(), txt.files.len()), (3, 3), "without rigs and frames");
-    assert_eq!((&bin.notes, &txt.notes), (&vec![], &vec![]));
-    assert_eq!((bin.beside, bin.positions.len()), (vec![], 8));
-    // pycolmap: `image.projection_center()` of image 20, the last; the sum of `point3D.xyz`.
-    let center = [-0.18425494062287595, 0.11058267526290974, 0.11110621415901362];
-    close(*bin.cameras.last().unwrap(), center, 1e-12);
-    let sum = [-14.46619668331794, -9.942024018235283, -17.581669871119047];
-    close(total(&bin.positions), sum, 1e-12);
+    for (name, format) in [("rig-bin", "COLMAP binary"), ("rig-txt", "COLMAP text")] {
+        let map = read::open(&data(name)).unwrap();
+        assert_eq!((map.format, map.positions.len(), map.notes.len()), (format, 8, 0));
+        assert_eq!((map.files.len(), map.beside.len()), (3, 0), "without rigs and frames");
+        // pycolmap: `image.projection_center()` of image 20, the last; the sum of `point3D.xyz`.
+        let center = [-0.18425494062287595, 0.11058267526290974, 0.11110621415901362];
+        close(*map.cameras.last().unwrap(), center, 1e-12);
+        let sum = [-14.46619668331794, -9.942024018235283, -17.581669871119047];
+        close(total(&map.positions), sum, 1e-12);
+    }
+    let dir = tempfile::tempdir().unwrap();
+    copy_folder(&data("rig-txt"), dir.path());
+    fs::rename(dir.path().join("points3D.txt"), dir.path().join("unused.txt")).unwrap();
+    fs::copy(data("cloud.ply"), dir.path().join("points3D.ply")).unwrap();
+    let map = read::open(dir.path()).unwrap();
+    assert_eq!((map.positions.len(), map.cameras.len()), (8, 20));
+    assert_eq!(map.notes, ["points3D.ply: read (no points3D.bin, no points3D.txt)"]);
     let alone = read::open(&data("rig-bin/points3D.bin")).unwrap();
-    assert_eq!((alone.positions, alone.ids), (bin.positions, bin.ids));
+    assert_eq!(alone.positions, read::open(&data("rig-bin")).unwrap().positions);
 }
 
 #[test]
@@ -57,11 +61,10 @@ fn names_need_not_be_utf8_and_text_may_have_windows_line_ends_and_no_2d_points()
     let text = "# c\r\n1 1 0 0 0 1 2 3 1 a b.jpg\r\n\r\n2 1 0 0 0 4 5 6 1 c.jpg\r\n";
     let (_dir, path) = write("images.txt", text);
     let images = colmap::read_images(&path).unwrap();
-    assert_eq!(
-        (images[0].name.as_slice(), images[0].pose.center),
-        (&b"a b.jpg"[..], [-1.0, -2.0, -3.0])
-    );
-    assert_eq!((images[1].name.as_slice(), images[1].n_points2d), (&b"c.jpg"[..], 0));
+    let numbers = |image: &colmap::Image| (image.pose.center, image.n_points2d);
+    assert_eq!((&images[0].name[..], &images[1].name[..]), (&b"a b.jpg"[..], &b"c.jpg"[..]));
+    assert_eq!(numbers(&images[0]), ([-1.0, -2.0, -3.0], 0));
+    assert_eq!(numbers(&images[1]), ([-4.0, -5.0, -6.0], 0));
 }
 
 /// Older COLMAP versions write points in the order of a hash map.
@@ -77,23 +80,20 @@ fn unsorted_points_are_sorted_with_their_tracks() {
 
 #[test]
 fn models_are_found_where_programs_put_them() {
-    let places =
-        ",0,sparse,sparse/0,sparse/3,model,models/0,models/2,colmap,colmap/sparse,colmap/sparse/0";
+    let places = ",0,sparse,sparse/0,sparse/3,model,models/0,models/2,colmap,colmap/sparse,colmap/sparse/0,\
+                  dslr_calibration_undistorted";
     // Models of undistorted images are read where there is no other.
     let undistorted = ["dense/0/sparse", "dense/sparse"];
     for place in places.split(',').chain(undistorted) {
-        for (fixture, format) in [("rig-bin", "COLMAP binary"), ("rig-txt", "COLMAP text")] {
-            let dir = tempfile::tempdir().unwrap();
-            copy_folder(&data(fixture), &dir.path().join(place));
+        let dir = tempfile::tempdir().unwrap();
+        copy_folder(&data("rig-txt"), &dir.path().join(place));
+        let input = read::open(dir.path()).unwrap();
+        assert_eq!((input.positions.len(), input.notes.len()), (8, 0), "{place}");
+        assert_eq!(input.model, Some(dir.path().join(place)));
+        if undistorted.contains(&place) {
+            copy_folder(&data("project/sparse/0"), &dir.path().join("sparse/0"));
             let input = read::open(dir.path()).unwrap();
-            assert_eq!((input.format, input.positions.len()), (format, 8), "{place}");
-            assert_eq!(input.model, Some(dir.path().join(place)), "{place}");
-            assert_eq!(input.notes, [""; 0], "{place}");
-            if undistorted.contains(&place) {
-                copy_folder(&data("project/sparse/0"), &dir.path().join("sparse/0"));
-                let input = read::open(dir.path()).unwrap();
-                assert_eq!((input.model, input.notes), (Some(dir.path().join("sparse/0")), vec![]));
-            }
+            assert_eq!((input.model, input.notes), (Some(dir.path().join("sparse/0")), vec![]));
         }
     }
 }
@@ -103,20 +103,18 @@ fn models_are_found_where_programs_put_them() {
 #[rustfmt::skip] // One row per line.
 fn of_several_models_the_largest_is_read_and_the_others_are_noted() {
     let (small, large) = (data("project/sparse/0"), data("rig-txt"));
-    let beside = [
-        "points3D.txt: not read, because points3D.bin exists",
-        "sparse/0: read, the largest of 2 models (8 points)",
-        "sparse/1: another model (8 points), give its path to read it",
-    ];
-    let several = [
-        "sparse/10: read, the largest of 3 models (8 points)",
-        "sparse/0: another model (6 points), give its path to read it",
-        "models/2: another model (6 points), give its path to read it",
-    ];
     let bin = data("rig-bin");
     for (models, format, notes) in [
-        ([(&bin, "sparse/0"), (&large, "sparse/0"), (&bin, "sparse/1")], "COLMAP binary", beside),
-        ([(&small, "sparse/0"), (&large, "sparse/10"), (&small, "models/2")], "COLMAP text", several),
+        ([(&bin, "sparse/0"), (&large, "sparse/0"), (&bin, "sparse/1")], "COLMAP binary", [
+            "points3D.txt: not read, because points3D.bin exists",
+            "sparse/0: read, the largest of 2 models (8 points)",
+            "sparse/1: another model (8 points), give its path to read it",
+        ]),
+        ([(&small, "sparse/0"), (&large, "sparse/10"), (&small, "models/2")], "COLMAP text", [
+            "sparse/10: read, the largest of 3 models (8 points)",
+            "sparse/0: another model (6 points), give its path to read it",
+            "models/2: another model (6 points), give its path to read it",
+        ]),
     ] {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir_all(dir.path().join("sparse/11")).unwrap();
@@ -125,16 +123,12 @@ fn of_several_models_the_largest_is_read_and_the_others_are_noted() {
         assert_eq!((input.format, input.positions.len()), (format, 8));
         let told = input.notes.join("\n").replace(dir.path().to_str().unwrap(), "");
         assert_eq!(told.replace('\\', "/"), notes.join("\n"));
-        // The folder that was named has priority, even if its model is smaller: hloc's best model
-        // is there.
+        // The folder that was named has priority, even if its model is smaller: hloc's best model is there.
         copy_folder(&small, dir.path());
         let input = read::open(dir.path()).unwrap();
-        let told = format!(
-            "the model of the folder itself: read, the first of {} models (6 points)",
-            models.len() + usize::from(format == "COLMAP text")
-        );
         assert_eq!(input.positions.len(), 6);
-        assert!(input.notes.contains(&told), "{:?}", input.notes);
+        let told = "the model of the folder itself: read, the first of ";
+        assert!(input.notes.iter().any(|note| note.starts_with(told)), "{:?}", input.notes);
     }
 }
 
@@ -164,6 +158,7 @@ fn descriptors_of_a_project_are_found_from_its_model_as_well() {
 fn cameras_are_not_needed_for_points() {
     for (file, from, to, note) in [
         ("cameras.txt", "SIMPLE_PINHOLE", "SPHERICAL", "expected a camera model of COLMAP for camera"),
+        ("cameras.txt", "\n1 SIMPLE_PINHOLE", "\n99 SIMPLE_PINHOLE", "2 of 20 images name a camera that is not in cameras.txt"),
         // A pose with NaN, and one of zeros.
         ("images.txt", "\n3 0.2448454332437206 ", "\n3 nan ", "1 of 20 cameras have no place"),
         ("images.txt", "\n2 0.69121825575770734 0.46875053236901132 0.54926565388881932 -0.028240091521257206", "\n2 0 0 0 0", "1 of 20 cameras have no place"),
@@ -186,11 +181,7 @@ fn what_other_programs_write_is_read_or_gets_a_line_that_helps() {
     for (inside, told) in [
         ("predictions.npz", "predictions of VGGT: give its COLMAP folder"),
         ("map.ply.gz", "gunzip"),
-        ("scene.glb", "DUSt3R"),
-        (
-            "splats/point_cloud/iteration_7/point_cloud.ply",
-            "point_cloud/iteration_*/point_cloud.ply",
-        ),
+        ("splats/point_cloud/iteration_7/point_cloud.ply", "give point_cloud/iteration_*"),
         ("project/MeshroomCache/Meshing/1", "aliceVision_exportColmap"),
         ("cache/StructureFromMotion/1", "aliceVision_exportColmap"),
     ] {
@@ -201,7 +192,4 @@ fn what_other_programs_write_is_read_or_gets_a_line_that_helps() {
         let error = read::open(&given).unwrap_err().to_string();
         assert!(error.contains(told) && !error.contains('\n'), "{error}");
     }
-    let eth = dir.path().join("courtyard");
-    copy_folder(&data("project/sparse/0"), &eth.join("dslr_calibration_undistorted"));
-    assert_eq!(read::open(&eth).unwrap().positions.len(), 6);
 }

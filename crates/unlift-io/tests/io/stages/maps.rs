@@ -37,18 +37,16 @@ pub fn released<const D: usize>(seed: u64, n: usize) -> Vec<Released<D>> {
     let lines = |draws: &mut Draws| {
         Obfuscation::Lines(Lines::through(&points(draws, n), &directions(draws)).unwrap())
     };
-    let [one_slot, two_slots] = [lines(draws), lines(draws)];
-    let centers = points(draws, 3);
-    let rays = Rays::try_new(&centers, indices(draws, 3), &directions(draws)).unwrap();
-    let offsets: Vec<f64> = (0..n).map(|_| draws.between(-9.0, 9.0)).collect();
-    let planes = AxisPlanes::try_new(indices(draws, D as u64), &offsets).unwrap();
-    let candidates = AxisCandidates::try_new(&points(draws, n)).unwrap();
+    let rays = Rays::try_new(&points(draws, 3), indices(draws, 3), &directions(draws));
+    let offsets: Vec<f64> = points::<1>(draws, n).concat();
+    let planes = AxisPlanes::try_new(indices(draws, D as u64), &offsets);
+    let candidates = AxisCandidates::try_new(&points(draws, n));
     let families = [
-        (one_slot, 1),
-        (two_slots, 2),
-        (Obfuscation::Rays(rays), 1),
-        (Obfuscation::AxisPlanes(planes), 1),
-        (Obfuscation::AxisCandidates(candidates), 1),
+        (lines(draws), 1),
+        (lines(draws), 2),
+        (Obfuscation::Rays(rays.unwrap()), 1),
+        (Obfuscation::AxisPlanes(planes.unwrap()), 1),
+        (Obfuscation::AxisCandidates(candidates.unwrap()), 1),
     ];
     let with_rest = |(obfuscation, slots)| {
         let origin = std::array::from_fn(|_| draws.between(-4e6, 4e6));
@@ -71,31 +69,25 @@ pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
     // Files have them in this order.
     let mut without_slot = order[n..].to_vec();
     without_slot.sort();
-    let dropped = without_slot.into_iter().map(|original| {
-        let reason = DropReason::ALL[original.index() % DropReason::ALL.len()];
-        Dropped { original, reason }
-    });
+    let reason = |original: OriginalId| DropReason::ALL[original.index() % DropReason::ALL.len()];
+    let dropped =
+        without_slot.into_iter().map(|original| Dropped { original, reason: reason(original) });
     let axes = (0..n).map(|_| draws.below(D as u64) as u8).collect();
     let slots = if n.is_multiple_of(2) { 1 + seed as usize % 2 } else { 1 };
     // The rows of a record are its slots in some order.
     let crossed = |record: usize| u32::from(slots == 2 && record.is_multiple_of(3));
     let row = |slot: usize| slot as u32 ^ crossed(slot / slots);
-    let secret = Secret::try_new(
-        order[..n].to_vec(),
-        seed.is_multiple_of(2).then_some(axes),
-        (0..n).map(row).collect(),
-        dropped.collect(),
-        n_all,
-        slots,
-    );
-    let secret = secret.unwrap().with_map(about(seed).map);
-    (Original::new(original), secret)
+    let hidden = order[..n].to_vec();
+    let axes = seed.is_multiple_of(2).then_some(axes);
+    let rows = (0..n).map(row).collect();
+    let secret = Secret::try_new(hidden, axes, rows, dropped.collect(), n_all, slots).unwrap();
+    (Original::new(original), secret.with_map(about(seed).map))
 }
 
 /// Lists of up to ten records; scores for every second seed.
 pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Neighborhoods {
     let mut draws = draws(seed);
-    let (mut offsets, mut records, mut scores) = (vec![0], Vec::new(), Vec::new());
+    let (mut offsets, mut records) = (vec![0], Vec::new());
     for slot in 0..n_records * slots_per_record {
         let own = (slot / slots_per_record) as u32;
         let length = draws.below(11.min(n_records as u64)) as usize;
@@ -103,17 +95,16 @@ pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Ne
         records.extend(others.take(length).map(RecordId));
         offsets.push(records.len() as u64);
     }
-    scores.extend(records.iter().map(|_| draws.normal() as f32));
+    let scores = records.iter().map(|_| draws.normal() as f32).collect();
     let scores = seed.is_multiple_of(2).then_some(scores);
     let lists = Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record);
     lists.unwrap().with_about(about(seed))
 }
 
 fn about(seed: u64) -> About {
-    let mut orders = RowOrder::STATED.to_vec();
-    orders.push(RowOrder::Unstated);
+    let order = RowOrder::STATED.get(seed as usize % 4).copied().unwrap_or(RowOrder::Unstated);
     let map = (!seed.is_multiple_of(3)).then_some(Fingerprint([seed as u8; 16]));
-    About { map, order: orders[seed as usize % 4], by_oracle: seed.is_multiple_of(2) }
+    About { map, order, by_oracle: seed.is_multiple_of(2) }
 }
 
 /// Recovered points, a fifth of them lost; axis and descriptor rows for every second seed.

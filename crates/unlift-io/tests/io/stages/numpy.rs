@@ -101,12 +101,9 @@ fn numpy_writes_the_same_values_in_every_form() {
     let folder = tempfile::tempdir().unwrap();
     let rewrite = r#"
 import numpy as np
-arrays = dict(np.load("a.npz"))
-wide = {"f": ">f8", "i": ">i8", "u": "<i8"}
-for name, array in arrays.items():
-    if array.dtype.kind in wide:
-        arrays[name] = np.asfortranarray(array.astype(wide[array.dtype.kind]))
-np.savez_compressed("a.npz", **arrays)
+arrays, wide = dict(np.load("a.npz")), {"f": ">f8", "i": ">i8", "u": "<i8"}
+of = lambda a: np.asfortranarray(a.astype(wide[a.dtype.kind])) if a.dtype.kind in wide else a
+np.savez_compressed("a.npz", **{name: of(array) for name, array in arrays.items()})
 "#;
     if run(folder.path(), "").is_some() {
         // Descriptors of floats stay floats, those of bytes become whole numbers.

@@ -63,19 +63,14 @@ fn released_maps() {
         ("foot", vec![], "expected a released map, with one of the arrays foot, center, offset, position, found arrays unlift, direction"),
         ("direction", floats("(3, 3)", &[1.0; 9]), "array direction: expected shape (2, 3), found (3, 3)"),
         ("foot", floats("(2, 2)", &[1.0; 4]), "array foot: expected shape (n, 3), found (2, 2)"),
-        ("foot", floats("(6,)", &[1.0; 6]), "array foot: expected shape (n, 3), found (6,)"),
         ("foot", npy("'<c8'", "(2, 3)", &[0; 48]), "array foot: expected numbers, found dtype <c8"),
-        ("foot", npy("'|O'", "(2, 3)", &[0; 48]), "array foot: expected numbers, found dtype |O"),
         ("foot", floats("(2, 3)", &[1.0; 5]), "array foot: expected 2 rows of 24 bytes, found 40 bytes"),
         ("foot", floats("(2, 3)", &[1.0, 2.0, 3.0, 4.0, f64::NAN, 6.0]), "array foot, row 1: expected a finite number, found NaN"),
         ("feet", floats("(1,)", &[1.0]), "array feet: expected only unlift, foot, direction, center, centers, regions, axis, offset, position, descriptor, descriptor_subspace, descriptor_words, public_descriptor, origin, bounds, found an unknown array"),
-        ("records", whole("(2, 1)", &[1, 0]), "array records: expected only unlift, foot, direction, center, centers, regions, axis, offset, position, descriptor, descriptor_subspace, descriptor_words, public_descriptor, origin, bounds, found an unknown array"),
-        ("descriptor", floats("(3, 2)", &[1.0; 6]), "array descriptor: expected shape (2, k), found (3, 2)"),
         ("descriptor", whole("(2, 2)", &[0, 1, 2, 256]), "array descriptor, row 1: expected a whole number below 256, or a float, found 256.0"),
         ("public_descriptor", floats("(2, 2)", &[1.0; 4]), "arrays: expected one of descriptor, descriptor_subspace and descriptor_words, and public_descriptor beside the last two, found public_descriptor"),
         ("descriptor_subspace", floats("(2, 2)", &[1.0; 4]), "array descriptor_subspace: expected shape (2, 1, d, d), found (2, 2)"),
         ("descriptor_words", whole("(2, 1, 1)", &[0, 0]), "array descriptor_words, row 0: expected a whole number below 0, found 0.0"),
-        ("origin", floats("(2,)", &[0.0; 2]), "array origin: expected shape (3,), found (2,)"),
         ("unlift", vec![], "metadata unlift, unit: expected m, px or kth_neighbor, found nothing"),
         ("unlift", text("[1]"), "metadata unlift: expected a JSON object, found [1]"),
         ("unlift", npy("'<U2'", "(1,)", &[0; 8]), "array unlift: expected a text without dimensions, as np.array(json.dumps(..)), found shape (1,)"),
@@ -84,7 +79,6 @@ fn released_maps() {
         ("unlift", text(r#"{"unit": "m", "slots": 2}"#), "metadata unlift: expected only kind, version, unit, family, scheme, fingerprint, rows_by, lists_by, slots_per_record, delta, epsilon, of_bytes, confidence_unknown, found slots"),
         ("unlift", text(r#"{"unit": "m", "version": 2}"#), "metadata unlift, version: expected 1, found 2"),
         ("unlift", text(r#"{"unit": "m", "kind": "truth"}"#), "expected a released map, found a truth file"),
-        ("unlift", text(r#"{"unit": "m", "family": "rays"}"#), "array centers: expected an array of shape (n, 3), found no such array"),
         ("unlift", text(r#"{"unit": "m", "family": "curves"}"#), "metadata unlift, family: expected one of lines, rays, axis_planes, axis_candidates, found \"curves\""),
     ] {
         refused(&with(lines(), name, bytes), read, expected);
@@ -92,17 +86,11 @@ fn released_maps() {
     let stated = with(lines(), "unlift", text(r#"{"unit": "m", "fingerprint": "00112233445566778899aabbccddeeff"}"#));
     let found = line(archive(&stated), read);
     assert!(found.ends_with("or none (the file was changed), found \"00112233445566778899aabbccddeeff\""), "{found}");
-    let rays = |center: &[i64], centers: &str, values: &[f64]| vec![
-        ("unlift", text(r#"{"unit": "m"}"#)), ("centers", floats(centers, values)),
-        ("center", whole("(1,)", center)), ("direction", floats("(1, 3)", &[1.0; 3])),
-    ];
-    refused(&rays(&[1], "(1, 3)", &[0.0; 3]), read, "array center, row 0: expected a whole number below 1, found 1.0");
-    refused(&rays(&[0], "(0, 3)", &[]), read, "array centers: expected 1 to 255 rows, found 0 rows");
-    let planes = |axis: Vec<u8>| vec![
-        ("unlift", text(r#"{"unit": "m"}"#)), ("axis", axis), ("offset", floats("(1,)", &[1.0])),
-    ];
-    refused(&planes(whole("(1,)", &[3])), read, "array axis, row 0: expected a whole number below 3, found 3.0");
-    refused(&planes(floats("(1,)", &[1.0])), read, "array axis: expected whole numbers, found dtype <f8");
+    let unit = || ("unlift", text(r#"{"unit": "m"}"#));
+    let rays = vec![unit(), ("centers", floats("(0, 3)", &[])), ("center", whole("(1,)", &[0])), ("direction", floats("(1, 3)", &[1.0; 3]))];
+    refused(&rays, read, "array centers: expected 1 to 255 rows, found 0 rows");
+    let planes = vec![unit(), ("axis", floats("(1,)", &[1.0])), ("offset", floats("(1,)", &[1.0]))];
+    refused(&planes, read, "array axis: expected whole numbers, found dtype <f8");
 }
 
 #[test]
@@ -117,9 +105,7 @@ fn lists() {
         (lists(&[1, 1, 0, 2, 0, 1]), "neighborhood of slot 0: expected each record once, found record 1 twice"),
         (vec![("records", whole("(2, 1)", &[1, 0]))], "array records: expected shape (3, k), found (2, 1)"),
         (scores(&[1.0, 2.0, f64::NAN, 4.0, 5.0, 6.0]), "neighborhood score 2: expected a finite number, found NaN"),
-        (with(lists(&[1, 2, 0, -1, 0, 1]), "scores", floats("(3, 1)", &[1.0; 3])), "array scores: expected shape (3, 2), found (3, 1)"),
         (vec![("neighbors", whole("(3, 1)", &[1, 2, 0]))], "expected neighborhoods of slots, found neighborhoods of points"),
-        (lines(), "expected neighborhoods of slots, found a released map"),
     ] {
         refused(&arrays, read, expected);
     }
@@ -134,12 +120,8 @@ fn recovered_points() {
     let read = |path: &Path| stage::read_recovered::<2>(path, None);
     for (name, bytes, expected) in [
         ("position", floats("(1, 2)", &[1.0, f64::NAN]), "array position, row 0: expected 2 numbers, or 2 NaN if lost, found [1.0, NaN]"),
-        ("position", floats("(1, 2)", &[1.0, f64::INFINITY]), "array position, row 0: expected a number in the range of f32, or NaN if lost, found inf"),
         ("position", floats("(1, 2)", &[1e300, 1.0]), "array position, row 0: expected a number in the range of f32, or NaN if lost, found 1e300"),
         ("status", whole("(2,)", &[0, 0]), "recovered slot 1: expected a position if and only if its status is ok, found ok"),
-        ("status", whole("(2,)", &[1, 1]), "recovered slot 0: expected a position if and only if its status is ok, found too_few_neighbors"),
-        ("status", whole("(2,)", &[0, 4]), "array status, row 1: expected a whole number below 4, found 4.0"),
-        ("support", whole("(1,)", &[0]), "array support: expected shape (2,), found (1,)"),
         ("evidence", floats("(2,)", &[0.0, f64::INFINITY]), "array evidence, row 1: expected a finite number, found inf"),
         ("found", floats("(2,)", &[0.5, 0.5]), "array error_scale: expected an array of shape (2,), found no such array"),
         ("axis", whole("(2,)", &[-1, -1]), "array axis, row 0: expected an axis, as there is a position, found -1"),
@@ -167,10 +149,8 @@ fn truth() {
     for (name, bytes, expected) in [
         ("slot", whole("(3,)", &[0, 0, -1]), "array slot, row 1: expected each slot once, found 0 as in row 0"),
         ("slot", whole("(3,)", &[0, -1, 2]), "array slot, row 2: expected slots below 2, the number of slots, found 2"),
-        ("slot", whole("(2,)", &[0, 1]), "array slot: expected shape (3,), found (2,)"),
         ("dropped", whole("(3,)", &[0, 0, 0]), "array dropped, row 1: expected the code of a reason, as there is no slot, found 0"),
         ("dropped", whole("(3,)", &[6, 6, 0]), "array dropped, row 0: expected 0, as there is a slot, found 6"),
-        ("dropped", whole("(3,)", &[0, 7, 0]), "array dropped, row 1: expected a whole number below 7, found 7.0"),
         ("swapped_axis", whole("(3,)", &[0, 1, 2]), "array swapped_axis, row 1: expected -1, as there is no slot, found 1"),
         ("descriptor_row", whole("(3,)", &[-1, -1, 0]), "array descriptor_row, row 0: expected a number, as there is a slot, found -1"),
         ("unlift", text(r#"{"unit": "m", "slots_per_record": 2}"#), "array descriptor_row: expected the descriptor row of each point, as records have two slots, found no such array"),
@@ -196,7 +176,6 @@ fn images() {
     refused(&with(image(), "a.jpg/foot", feet()), all, "expected the arrays of each image together, found image a.jpg again");
     refused(&with(image(), "foot", feet()), all, "expected arrays below the names of images, as a.jpg/foot, found array foot");
     refused(&with(image(), "b.jpg/unlift", text("{")), all, "image b.jpg, metadata unlift: expected a JSON object, found EOF while parsing an object at line 1 column 1");
-    refused(&lines(), all, "expected arrays below the names of images, as a.jpg/foot, found array foot");
     let next = |name: &'static str| move |path: &Path| ImageFile::open(path, Kind::Released)?.expect(name, Path::new("r.npz")).map(drop);
     refused(&image(), next("b.jpg"), "expected image b.jpg, as in r.npz, found a.jpg");
     let end = |path: &Path| ImageFile::open(path, Kind::Released)?.expect_end(Path::new("r.npz"));
@@ -212,22 +191,14 @@ fn maps_and_stage_files_are_not_confused() {
     let points = archive(&[("points", floats("(1, 3)", &[1.0; 3]))]);
     let found = line(points, stage::read_released::<3>);
     assert!(found.ends_with("foot, center, offset, position, found arrays points"), "{found}");
-    for (bytes, found) in
-        [(&b""[..], "an empty file"), (b"ply\nformat ascii 1.0\n", "another file")]
-    {
-        let expected = format!("expected an archive of NumPy arrays (.npz), found {found}");
-        assert_eq!(line(bytes, stage::kind), expected);
-    }
+    let archive_expected = "expected an archive of NumPy arrays (.npz), found";
+    assert_eq!(line("", stage::kind), format!("{archive_expected} an empty file"));
+    assert_eq!(line("ply\n", stage::kind), format!("{archive_expected} another file"));
     // An array that unpacks to more than the budget, from few bytes.
-    let n = 34_000_000;
-    let large = npy("'<i8'", &format!("(1, {n})"), &vec![0; 8 * n]);
-    let large = archive(&[("records", large)]);
-    assert!(large.len() < 1 << 20);
-    let found = line(large, |path| stage::read_neighborhoods(path, 1, 1));
-    assert!(
-        found.starts_with("array records: expected at most 256 MiB in memory of a file"),
-        "{found}"
-    );
+    let large = npy("'<i8'", "(1, 34000000)", &vec![0; 8 * 34_000_000]);
+    let found = line(archive(&[("records", large)]), |path| stage::read_neighborhoods(path, 1, 1));
+    let expected = "array records: expected at most 256 MiB in memory of a file";
+    assert!(found.starts_with(expected), "{found}");
 }
 
 /// Feet and directions as they are written, in the map's frame.
