@@ -17,12 +17,12 @@ fn set_share(document: &mut Value, percent: f64) {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn what_leaks_more_or_is_out_of_view_fails() {
     let place = Place::with_room(500);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --neighbors \
                  oracle --neighbors geometric --solver joint --quiet --out a";
     place.ends(audit, 0);
-    // The names of changed copies.
     let changes: [(&str, fn(&mut Value)); 10] = [
         ("was.json", |_| ()),
         ("old.json", |document| set_share(document, 40.0)),
@@ -88,14 +88,12 @@ fn what_leaks_more_or_is_out_of_view_fails() {
     let audit = "audit map room.csv --k 10 --schemes olc --inlier-ratios 1 --quiet";
     place.ends(&format!("{audit} --out u"), 0);
     place.ends(&format!("{audit} --scale 1 --thresholds 0.10 --out t"), 0);
-    let own = "unlift: --out: c/compare.html: expected nothing, or a report";
-    let thresholds = "thresholds: expected 0.10, 0.25, as in was.json, found 0.10";
     place.refuses(
         "compare was.json",
         &[
             ("u/audit.json --out d", 3, "unit: expected m, as in was.json, found kth_neighbor"),
-            ("t/audit.json --out d", 3, thresholds),
-            ("was.json --out c", 2, own),
+            ("t/audit.json --out d", 3, "thresholds: expected 0.10, 0.25, as in was.json, found 0.10"),
+            ("was.json --out c", 2, "unlift: --out: c/compare.html: expected nothing, or a report"),
         ],
     );
     assert!(!place.path("d").exists());
