@@ -67,7 +67,6 @@ fn our_solvers() {
 #[derive(Debug)]
 struct Wrong;
 
-/// It returns results for half of the slots only.
 impl Solver<3> for Wrong {
     fn name(&self) -> &str {
         "half"
@@ -83,21 +82,18 @@ impl Solver<3> for Wrong {
     }
 }
 
-/// Its lines pass 10 cm beside their points.
 impl Scheme<3> for Wrong {
     fn name(&self) -> &str {
         "beside"
     }
 
     fn lift(&self, points: &LocalPoints<'_, 3>, _: &Key) -> Result<Lifted<3>, Error> {
-        let points = points.positions;
-        let beside: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], p[2] + 0.1]).collect();
-        let lines = Lines::through(&beside, &vec![[1.0, 0.0, 0.0]; points.len()])?;
+        let beside: Vec<_> = points.positions.iter().map(|&[x, y, z]| [x, y, z + 0.1]).collect();
+        let lines = Lines::through(&beside, &vec![[1.0, 0.0, 0.0]; beside.len()])?;
         Ok(Lifted::one_each(Obfuscation::Lines(lines)))
     }
 }
 
-/// Its lists state no map.
 impl Source<3> for Wrong {
     fn name(&self) -> &str {
         "nameless"

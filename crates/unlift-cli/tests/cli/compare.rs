@@ -4,9 +4,6 @@ use serde_json::{Value, json};
 
 use crate::common::{Place, texts};
 
-/// A change to a document, with the name of the changed copy.
-type Change<'a> = (&'a str, &'a dyn Fn(&mut Value));
-
 fn rows(document: &mut Value) -> &mut Vec<Value> {
     document["results"].as_array_mut().unwrap()
 }
@@ -20,31 +17,29 @@ fn set_share(document: &mut Value, percent: f64) {
 }
 
 #[test]
+#[rustfmt::skip] // One row per line.
 fn what_leaks_more_or_is_out_of_view_fails() {
     let place = Place::with_room(500);
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --neighbors \
                  oracle --neighbors geometric --solver joint --quiet --out a";
     place.ends(audit, 0);
-    let std = json!({ "recovered_percent": { "0.10": 0.3, "0.25": 0.601 } });
-    let changes: [Change<'_>; 10] = [
-        ("was.json", &|_| ()),
-        ("old.json", &|document| set_share(document, 40.0)),
-        ("new.json", &|document| set_share(document, 42.5)),
-        ("near.json", &|document| set_share(document, 41.5)),
-        ("repeated.json", &|document| {
+    let changes: [(&str, fn(&mut Value)); 10] = [
+        ("was.json", |_| ()),
+        ("old.json", |document| set_share(document, 40.0)),
+        ("new.json", |document| set_share(document, 42.5)),
+        ("near.json", |document| set_share(document, 41.5)),
+        ("repeated.json", |document| {
             set_share(document, 41.5);
-            rows(document)[0]["std"] = std.clone();
+            rows(document)[0]["std"] = json!({"recovered_percent": {"0.10": 0.3, "0.25": 0.601}});
         }),
-        ("gone.json", &|document| {
+        ("gone.json", |document| {
             rows(document).retain(|row| row["scheme"] != "ppl");
             document["break_even"] = json!([]);
         }),
-        ("map.json", &|document| document["input"]["sha256"] = json!("0".repeat(64))),
-        ("scale.json", &|document| document["input"]["scale_m_per_unit"] = json!(4.0)),
-        ("database.json", &|document| {
-            document["input"]["other_sha256"]["descriptors"] = json!("0")
-        }),
-        ("attack.json", &|document| rows(document).retain(|row| row["neighbors"] != "geometric")),
+        ("map.json", |document| document["input"]["sha256"] = json!("0".repeat(64))),
+        ("scale.json", |document| document["input"]["scale_m_per_unit"] = json!(4.0)),
+        ("database.json", |document| document["input"]["other_sha256"]["descriptors"] = json!("0")),
+        ("attack.json", |document| rows(document).retain(|row| row["neighbors"] != "geometric")),
     ];
     for (name, change) in changes {
         let mut document = place.json("a/audit.json");
@@ -73,20 +68,17 @@ fn what_leaks_more_or_is_out_of_view_fails() {
             text.starts_with("NOT COMPARED: ") && text.contains("\nnot comparable: "),
             "{text}"
         );
-        for (until, code, start) in [
-            ("2999-12-31", 0, "accepted until 2999-12-31 (new-rooms): "),
-            ("2020-02-29", 1, "NOT COMPARED, as --accept ended on 2020-02-29: "),
-        ] {
-            let (code, start) = match name {
-                // An attack that is gone cannot be accepted.
-                "attack.json" => (1, "NOT COMPARED: only in the old audit"),
-                _ => (code, start),
-            };
-            let accept = format!("--accept=new-rooms, until {until}");
-            let output = place.program(["compare", "was.json", name, &accept]).output().unwrap();
-            assert_eq!(output.status.code(), Some(code), "{name}: {output:?}");
-            assert!(texts(&output).0.starts_with(start), "{name}: {output:?}");
-        }
+    }
+    for (name, until, code, start) in [
+        ("map.json", "2999-12-31", 0, "accepted until 2999-12-31 (new-rooms): "),
+        ("map.json", "2020-02-29", 1, "NOT COMPARED, as --accept ended on 2020-02-29: "),
+        // An attack that is gone cannot be accepted.
+        ("attack.json", "2999-12-31", 1, "NOT COMPARED: only in the old audit"),
+    ] {
+        let accept = format!("--accept=new-rooms, until {until}");
+        let output = place.program(["compare", "was.json", name, &accept]).output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{name}: {output:?}");
+        assert!(texts(&output).0.starts_with(start), "{name}: {output:?}");
     }
     let compared = place.prints("compare old.json new.json --json --out c", 1);
     assert_eq!(compared["more"][0]["scheme"], "olc");
@@ -96,14 +88,12 @@ fn what_leaks_more_or_is_out_of_view_fails() {
     let audit = "audit map room.csv --k 10 --schemes olc --inlier-ratios 1 --quiet";
     place.ends(&format!("{audit} --out u"), 0);
     place.ends(&format!("{audit} --scale 1 --thresholds 0.10 --out t"), 0);
-    let own = "unlift: --out: c/compare.html: expected nothing, or a report";
-    let thresholds = "thresholds: expected 0.10, 0.25, as in was.json, found 0.10";
     place.refuses(
         "compare was.json",
         &[
             ("u/audit.json --out d", 3, "unit: expected m, as in was.json, found kth_neighbor"),
-            ("t/audit.json --out d", 3, thresholds),
-            ("was.json --out c", 2, own),
+            ("t/audit.json --out d", 3, "thresholds: expected 0.10, 0.25, as in was.json, found 0.10"),
+            ("was.json --out c", 2, "unlift: --out: c/compare.html: expected nothing, or a report"),
         ],
     );
     assert!(!place.path("d").exists());

@@ -6,8 +6,6 @@ use std::process::{Command, Stdio};
 
 use crate::common::{Place, texts};
 
-const HIDE: &str = "obfuscate room.csv --schemes olc --k 10 --seed 1 --out hidden";
-
 #[test]
 fn an_interrupt_tells_what_was_done_and_that_nothing_is_written() {
     let place = Place::with_room(3000);
@@ -21,15 +19,15 @@ fn an_interrupt_tells_what_was_done_and_that_nothing_is_written() {
     let killed = Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap();
     stderr.read_to_string(&mut told).unwrap();
     assert_eq!((killed.success(), program.wait().unwrap().code()), (true, Some(130)), "{told}");
-    assert!(told.contains("unlift: interrupted at "), "{told}");
-    assert!(told.contains("nothing is written"), "{told}");
+    assert!(told.contains("unlift: interrupted at ") && told.contains("nothing is written"));
     assert!(!place.path("a/audit.json").exists());
 }
 
 #[test]
 fn a_reader_that_has_enough_ends_the_output_and_a_full_disk_is_an_error() {
     let place = Place::with_room(200);
-    for line in ["schemes", "--help", "models", HIDE] {
+    let hide = "obfuscate room.csv --schemes olc --k 10 --seed 1 --out hidden";
+    for line in ["schemes", "--help", "models", hide] {
         let done = place.shell(&format!("{{ unlift {line} 2>errors; echo $? >code; }} | true"));
         assert_eq!(place.text("code"), "0\n", "{line}: {done:?}");
         assert!(!place.text("errors").contains("stdout"), "{line}");
