@@ -4,6 +4,8 @@ use serde_json::{Value, json};
 
 use crate::common::{Place, texts};
 
+type Change = (&'static str, fn(&mut Value));
+
 fn rows(document: &mut Value) -> &mut Vec<Value> {
     document["results"].as_array_mut().unwrap()
 }
@@ -23,7 +25,7 @@ fn what_leaks_more_or_is_out_of_view_fails() {
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --neighbors \
                  oracle --neighbors geometric --solver joint --quiet --out a";
     place.ends(audit, 0);
-    let changes: [(&str, fn(&mut Value)); 10] = [
+    let changes: [Change; 10] = [
         ("was.json", |_| ()),
         ("old.json", |document| set_share(document, 40.0)),
         ("new.json", |document| set_share(document, 42.5)),

@@ -43,7 +43,6 @@ fn every_command_line_of_the_readme_runs_as_it_is_written() {
     let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md");
     let readme = fs::read_to_string(readme).unwrap();
     let blocks = readme.split("```sh\n").skip(1).filter_map(|block| block.split("```").next());
-    // Without comments.
     let lines = blocks.flat_map(str::lines).filter_map(|line| line.split('#').next());
     let lines: Vec<&str> = lines.map(str::trim).filter(|line| !line.is_empty()).collect();
     assert!(lines.len() >= 15, "{lines:#?}");

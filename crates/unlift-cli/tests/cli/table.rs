@@ -6,8 +6,7 @@ use crate::common::{Place, recovered, rows};
 #[rustfmt::skip] // One row per line.
 fn the_ending_decides_what_is_written() {
     let place = Place::with_room(500);
-    let audit =
-        "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --quiet";
+    let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5";
     place.ends(&format!("{audit} --neighbors oracle --neighbors geometric --out a"), 0);
     let document = place.json("a/audit.json");
     let written = |name: &str, more: &str| {
