@@ -15,7 +15,6 @@ use unlift_io::stage::{
     Kind as Stage, has_images, kind, read_recovered, read_released, read_truth,
 };
 
-use crate::Error;
 use crate::args::ExportArgs;
 use crate::output::print;
 
