@@ -158,7 +158,6 @@ impl Drop for OutputSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::atomic::tests::entries;
 
     #[test]
     fn a_set_is_moved_whole_or_not_at_all() {
@@ -178,11 +177,11 @@ mod tests {
         let error = other.commit().unwrap_err().to_string();
         let rule = "expected nothing, or an audit.json of an earlier run, found another file";
         assert!(error.ends_with(rule), "{error}");
-        assert_eq!(entries(&out), ["audit.json"]);
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
         fs::remove_file(out.join("audit.json")).unwrap();
         for _ in 0..2 {
             set("{\n  \"unlift\": \"1\"}").unwrap().commit().unwrap();
         }
-        assert_eq!(entries(&out), ["audit.json", "model.txt"]);
+        assert_eq!(fs::read_to_string(out.join("model.txt")).unwrap(), "# unlift model");
     }
 }

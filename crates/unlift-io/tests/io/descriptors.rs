@@ -132,8 +132,9 @@ fn features_of_changed_models_pass_unless_they_are_in_another_order() {
     let dir = tempfile::tempdir().unwrap();
     for (kept, n_views) in [(0..8, 8), (0..8, 2), (2..5, 2), (1..8, 3)] {
         let input = model(dir.path(), kept.clone(), n_views);
-        // Images in another order: none, all, every other.
-        for every in [usize::MAX, 1, 2] {
+        // Images in another order: none, all, every other. Of three images, one cannot be told.
+        let n_orders = if kept.len() > 3 { 3 } else { 2 };
+        for every in [usize::MAX, 1, 2].into_iter().take(n_orders) {
             let row = |image: usize, at: usize| {
                 let is_wrong = (image + 1).is_multiple_of(every);
                 let point = if is_wrong { at } else { point_of(image, at) };
@@ -152,11 +153,7 @@ fn features_of_changed_models_pass_unless_they_are_in_another_order() {
             write_bytes(&db, |image| rows(image).map(|x| (60.0 * x) as u8).collect());
             for path in [h5, db] {
                 let error = read::descriptors(&path, &input).err();
-                assert_eq!(
-                    error.is_none(),
-                    every > 2,
-                    "{every} {kept:?} {n_views} {path:?} {error:?}"
-                );
+                assert_eq!(error.is_none(), every > 2, "{every} {kept:?} {path:?} {error:?}");
                 fs::remove_file(path).unwrap();
             }
         }
@@ -288,7 +285,6 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         bytes("id of a point missing", patched(good.clone(), 24 + 8, &[100]), "d: point 3: expected a descriptor, found none among 6"),
         bytes("dummies", zeros, "d: descriptors: expected real descriptors, found only zeros (dummies)"),
         bytes("a database cut short", fixture("project/database.db")[..100].to_vec(), "d: table images: expected a COLMAP database, found database disk image is malformed"),
-        sql("a database without images", "PRAGMA foreign_keys=0; DROP TABLE images", "d: table images: expected a COLMAP database, found no such table: images"),
         sql("an image under another name", "UPDATE images SET name = 'x' WHERE name = 'i2.jpg'", "d: image \"i2.jpg\": expected this image of the model, found no such image"),
         sql("fewer descriptors than keypoints", "UPDATE descriptors SET rows = 2, data = substr(data, 1, 256)", "d: image \"küche/ä 0.jpg\": expected a descriptor for keypoint 2, found 2 descriptors"),
         sql("a blob cut short", "UPDATE descriptors SET data = substr(data, 1, 1000)", "d: image \"küche/ä 0.jpg\": expected 8 descriptors of 128 bytes, found 1000 bytes"),

@@ -29,7 +29,7 @@ fn alone(what: &'static str, name: &'static str, bytes: impl AsRef<[u8]>, line: 
 
 #[test]
 fn every_malformed_file_is_refused_with_its_line() {
-    let all = [binary(), text(), ply(), tables(), arrays(), paths()];
+    let all = [binary(), text(), ply(), tables_and_other_names(), arrays()];
     for (what, files, open, line) in all.into_iter().flatten() {
         let dir = tempfile::tempdir().unwrap();
         for (name, bytes) in &files {
@@ -164,7 +164,7 @@ fn ply() -> Vec<Row> {
 }
 
 #[rustfmt::skip] // One row per line.
-fn tables() -> Vec<Row> {
+fn tables_and_other_names() -> Vec<Row> {
     let csv = |what, text: &str, line: &str| alone(what, "a.csv", text, line);
     vec![
         csv("empty", "", ": expected at least one point, found none"),
@@ -173,6 +173,10 @@ fn tables() -> Vec<Row> {
         csv("columns without y", "x,north,z\n1,2,3\n", ":1: expected numbers, or columns named x, y and z, found \"x,north,z\""),
         csv("row shorter than its header", "id,x,y,z\n1,2,3\n", ":2: expected 4 columns up to z, found 3"),
         alone("control characters", "a.xyz", "1 2 \u{1b}[31m\n", ":1: expected a number for z, found \"\\u{1b}[31m\""),
+        ("empty folder", vec![], "", ": expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none".to_owned()),
+        alone("a dropped format", "a.laz", "LASF", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .laz file (convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply)"),
+        alone("images given by themselves", "images.bin", "", ": expected a file with points, found another file of a COLMAP model (give its folder)"),
+        alone("a database", "database.db", "SQLite format 3", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .db file"),
     ]
 }
 
@@ -195,16 +199,6 @@ fn arrays() -> Vec<Row> {
         npy("no order", of("'<f8'", "None", "(2, 3)"), ": header (byte 10): expected fortran_order True or False, found \"None\""),
         npy("2^62 rows", of("'<f8'", "False", "(4611686018427387904, 3)"), ": header (byte 128): expected 4611686018427387904 rows of 24 bytes, found 48 bytes"),
         npy("nothing in the header", [&b"\x93NUMPY\x01\0\x02\0{}"[..], &[0; 48]].concat(), ": header (byte 10): expected numbers, or fields of numbers called x, y and z, found \"\""),
-    ]
-}
-
-#[rustfmt::skip] // One row per line.
-fn paths() -> Vec<Row> {
-    vec![
-        ("empty folder", vec![], "", ": expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none".to_owned()),
-        alone("a dropped format", "a.laz", "LASF", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .laz file (convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply)"),
-        alone("images given by themselves", "images.bin", "", ": expected a file with points, found another file of a COLMAP model (give its folder)"),
-        alone("a database", "database.db", "SQLite format 3", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .db file"),
     ]
 }
 

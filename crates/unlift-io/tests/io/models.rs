@@ -1,7 +1,6 @@
 //! Tests COLMAP models, binary and text, and where they are found.
 
 use std::fs;
-use std::path::Path;
 
 use unlift_io::read::{self, colmap};
 
@@ -9,20 +8,17 @@ use super::{close, copy_folder, data, fixture, total, write};
 
 #[test]
 fn binary_and_text_models_are_equal() {
-    let (bin, txt) = (data("rig-bin"), data("rig-txt"));
-    let file = |folder: &Path, name: &str, e: &str| folder.join(format!("{name}.{e}"));
-    let cameras = colmap::read_cameras(&file(&bin, "cameras", "bin")).unwrap();
-    assert_eq!(cameras, colmap::read_cameras(&file(&txt, "cameras", "txt")).unwrap());
+    let [bin, txt] = [("rig-bin", "bin"), ("rig-txt", "txt")].map(|(folder, extension)| {
+        let file = |name: &str| data(folder).join(format!("{name}.{extension}"));
+        let cameras = colmap::read_cameras(&file("cameras")).unwrap();
+        let images = colmap::read_images(&file("images")).unwrap();
+        (cameras, images, colmap::read_points(&file("points3D"), true).unwrap())
+    });
+    assert_eq!(bin, txt);
+    let (cameras, images, points) = bin;
     let models: Vec<_> = cameras.iter().map(|camera| *camera.model).collect();
     assert_eq!(models, colmap::CAMERA_MODELS, "one camera of every model");
-
-    let images = colmap::read_images(&file(&bin, "images", "bin")).unwrap();
-    assert_eq!(images, colmap::read_images(&file(&txt, "images", "txt")).unwrap());
-    assert_eq!(images[0].name, "küche/ä 0.jpg".as_bytes());
-    assert_eq!(images[0].n_points2d, 4);
-
-    let points = colmap::read_points(&file(&bin, "points3D", "bin"), true).unwrap();
-    assert_eq!(points, colmap::read_points(&file(&txt, "points3D", "txt"), true).unwrap());
+    assert_eq!((&*images[0].name, images[0].n_points2d), ("küche/ä 0.jpg".as_bytes(), 4));
     assert_eq!(points.ids, [1, 3, 5, 7, 12, 44, 900, 1 << 40]);
     assert_eq!(points.tracks.unwrap().row(1), [(2, 1), (3, 0), (4, 0)]);
 }
@@ -102,8 +98,7 @@ fn models_are_found_where_programs_put_them() {
 #[test]
 #[rustfmt::skip] // One row per line.
 fn of_several_models_the_largest_is_read_and_the_others_are_noted() {
-    let (small, large) = (data("project/sparse/0"), data("rig-txt"));
-    let bin = data("rig-bin");
+    let [small, large, bin] = ["project/sparse/0", "rig-txt", "rig-bin"].map(data);
     for (models, format, notes) in [
         ([(&bin, "sparse/0"), (&large, "sparse/0"), (&bin, "sparse/1")], "COLMAP binary", [
             "points3D.txt: not read, because points3D.bin exists",

@@ -51,6 +51,7 @@ fn same(input: &Input, format: &str) {
 fn every_form_gives_the_same_points_and_cameras() {
     let folder = tempfile::tempdir().unwrap();
     let small = r#"{"shots": {}, "points": {"1": {"coordinates": [1, 2, 3]}}}"#;
+    let of_parts = "read, the largest of 2 reconstructions (3 points)";
     let several = format!("[{small}, {OPENSFM}]");
     let models = NVM.replacen(
         "\n\n",
@@ -64,12 +65,7 @@ fn every_form_gives_the_same_points_and_cameras() {
         ("bundler/bundle.out", BUNDLER, "Bundler", "1 of 3 cameras have no place"),
         ("nvm/scene.nvm", NVM, "NVM", ""),
         ("nvm/models.nvm", &models, "NVM", of_models),
-        (
-            "sfm/reconstruction.json",
-            &several,
-            "OpenSfM",
-            "read, the largest of 2 reconstructions (3 points)",
-        ),
+        ("sfm/reconstruction.json", &several, "OpenSfM", of_parts),
         ("json/map.json", OPENSFM, "OpenSfM", ""),
         ("nerf/transforms.json", NERFSTUDIO, "nerfstudio", ""),
     ] {

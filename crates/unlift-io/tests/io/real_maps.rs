@@ -24,11 +24,10 @@ fn dataset(name: &str) -> Option<(PathBuf, Input, Original<3>)> {
 
 #[test]
 fn descriptors_of_real_maps_are_read_and_name_neighbors() {
-    let options = SchemeOptions { voxel: 1.0 };
+    let (options, key) = (SchemeOptions { voxel: 1.0 }, Key::from_seed(0));
     for (name, scheme_name, by, at_least) in [
         ("redkitchen-aliked", "olc", "similarity", 0.3),
-        // Measured on olc: 5.1 % and 14.5 %. On pairs, the list of a slot is that of its descriptor
-        // row.
+        // Measured on olc: 5.1 % and 14.5 %. On pairs, the list of a slot is that of its descriptor row.
         ("castle", "olc", "similarity", 0.045),
         ("castle", "olc", "overlap", 0.14),
         ("castle", "ppl", "overlap", 0.13),
@@ -37,10 +36,9 @@ fn descriptors_of_real_maps_are_read_and_name_neighbors() {
         let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
         let search = oracle::search(&original).unwrap();
         let scheme = scheme(scheme_name).unwrap().of_dimension::<3>(&options).unwrap();
-        let key = Key::from_seed(0);
         let (released, secret) = obfuscate(&*scheme, &original, Some(&descriptors), &key).unwrap();
-        let rows = secret.by_descriptor_row();
-        let near = oracle::TrueNeighbors::new(&search, &rows, 50).unwrap();
+        let rows = &secret.by_descriptor_row();
+        let near = oracle::TrueNeighbors::new(&search, rows, 50).unwrap();
         let source = Named::parse(by).unwrap().with_k(20).of_dimension::<3>().unwrap();
         let lists = source.lists(&released, 20, 0).unwrap();
         let ratio = near.measured_inlier_ratio(&lists);
@@ -71,7 +69,7 @@ fn what_is_said_about_a_real_map_comes_true() {
                 found.push(reliability(&recovered, &accuracy, threshold).unwrap());
             }
         }
-        let mut all = found.pop().unwrap();
+        let mut all = found.remove(0);
         found.iter().for_each(|one| all.merge(one));
         for bin in &all.bins {
             let (said, was) = (bin.predicted().unwrap(), bin.observed().unwrap());

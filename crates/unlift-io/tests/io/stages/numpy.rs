@@ -34,20 +34,15 @@ fn run(folder: &Path, script: &str) -> Option<String> {
     Some(String::from_utf8(output.stdout).unwrap())
 }
 
-/// The snippets of the document, in order.
-fn snippets() -> Vec<String> {
-    let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md");
-    let document = std::fs::read_to_string(document).unwrap();
-    let blocks = document.split("```python\n").skip(1);
-    blocks.map(|block| block.split("```").next().unwrap().to_owned()).collect()
-}
-
 #[test]
 fn the_snippets_of_the_document_run() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let snippets = snippets();
-    let [own, write, read] = &snippets[..] else { panic!("{} snippets", snippets.len()) };
+    let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md");
+    let document = std::fs::read_to_string(document).unwrap();
+    let blocks = document.split("```python\n").skip(1);
+    let snippets: Vec<&str> = blocks.filter_map(|block| block.split("```").next()).collect();
+    let [own, write, read] = snippets[..] else { panic!("{} snippets", snippets.len()) };
     if run(folder.path(), &format!("{GIVEN}{own}{write}")).is_none() {
         return;
     }

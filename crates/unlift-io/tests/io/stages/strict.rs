@@ -191,9 +191,9 @@ fn maps_and_stage_files_are_not_confused() {
     let points = archive(&[("points", floats("(1, 3)", &[1.0; 3]))]);
     let found = line(points, stage::read_released::<3>);
     assert!(found.ends_with("foot, center, offset, position, found arrays points"), "{found}");
-    let archive_expected = "expected an archive of NumPy arrays (.npz), found";
-    assert_eq!(line("", stage::kind), format!("{archive_expected} an empty file"));
-    assert_eq!(line("ply\n", stage::kind), format!("{archive_expected} another file"));
+    let expected = "expected an archive of NumPy arrays (.npz), found an empty file";
+    assert_eq!(line("", stage::kind), expected);
+    assert!(line("ply\n", stage::kind).ends_with("found another file"));
     // An array that unpacks to more than the budget, from few bytes.
     let large = npy("'<i8'", "(1, 34000000)", &vec![0; 8 * 34_000_000]);
     let found = line(archive(&[("records", large)]), |path| stage::read_neighborhoods(path, 1, 1));
