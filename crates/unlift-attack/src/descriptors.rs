@@ -114,7 +114,8 @@ impl Descriptors {
         row
     }
 
-    pub(crate) fn rows(&self) -> impl Iterator<Item = Vec<f32>> {
+    /// Returns all rows as floats.
+    pub fn rows(&self) -> impl Iterator<Item = Vec<f32>> {
         (0..self.len()).map(|at| self.row(at))
     }
 

@@ -93,11 +93,7 @@ pub fn public_descriptors(
             let expected = format!("descriptors of {}", kind.name());
             return Err(FileError::new(path, "", expected, is.name()).into());
         }
-        let mut row = vec![0.0; descriptors.dim()];
-        for at in 0..descriptors.len() {
-            descriptors.read_row(at, &mut row);
-            values.extend_from_slice(&row);
-        }
+        values.extend(descriptors.rows().flatten());
     }
     if values.is_empty() {
         return Err(FileError::new(path, "", "descriptors", "none").into());

@@ -497,9 +497,7 @@ mod tests {
             ("ppl:joint:oracle@0.5:0.10<=20", [Some("ppl"), Some("joint"), Some("oracle")], (Some(0.5), 0.1, Recovered, 20.0)),
             ("ppl:oracle:joint@0.5:0.10<=20", [Some("ppl"), Some("joint"), Some("oracle")], (Some(0.5), 0.1, Recovered, 20.0)),
             ("all:overlap:0.10:gain<=20%", [None, None, Some("overlap")], (None, 0.1, Gain, 20.0)),
-            ("ppl+:ransac:0.10<=20", [Some("ppl+"), Some("ransac"), None], (None, 0.1, Recovered, 20.0)),
             // A sequence is named with its number of queries.
-            ("dcl2d:sequence@5:10<=20", [Some("dcl2d"), None, Some("sequence@5")], (None, 10.0, Recovered, 20.0)),
             ("dcl2d:sequence+lists@5:10<=20", [Some("dcl2d"), None, Some("sequence+lists@5")], (None, 10.0, Recovered, 20.0)),
             ("all:tracks@20:5:gain<=1", [None, None, Some("tracks@20")], (None, 5.0, Gain, 1.0)),
         ] {
@@ -538,7 +536,6 @@ mod tests {
             // What needs no neighborhoods counts unless a solver or the oracle is named.
             ("olc:0.10<=60", alone, Some(66.6)),
             ("olc:overlap:0.10<=60", by_overlap, Some(66.6)),
-            ("all@0.5:0.10<=60", alone, Some(66.6)),
             ("olc:joint:0.10<=60", alone, Some(58.6)),
             ("olc:oracle:0.10<=60", alone, Some(58.6)),
         ] {
@@ -589,7 +586,6 @@ mod tests {
         for (text, missing, is_missed) in [
             ("ppl:0.1<=20", &scheme, true),
             ("all@0.3:0.1<=20", &scheme, true),
-            ("ppl:overlap:0.1<=20", &scheme, true),
             ("olc:0.1<=20", &scheme, false),
             ("all:0.1<=20", &lists, true),
             ("ppl:oracle@0.5:0.1<=20", &lists, true),
@@ -611,16 +607,12 @@ mod tests {
             ("ppl@0.5:0.10<20", form, "no <="),
             ("ppl<=20", form, "no threshold"),
             ("ppl:joint<=20", form, "no threshold"),
-            ("ppl:joint@0.5<=20", form, "no threshold"),
             ("ppl:0.1:loss<=20", form, ":loss (only :gain is known)"),
             (":0.1<=20", form, "no scheme"),
             ("ppl@2:0.1<=20", "inlier ratio: expected a number from 0 to 1", "2"),
             ("ppl:x<=20", "threshold: expected a number above 0", "x"),
-            ("ppl:joint:x<=20", "threshold: expected a number above 0", "x"),
             ("ppl:0.1<=120", "bound: expected 0 to 100 percent", "120"),
             ("ppl:jiont:0.1<=20", &names, "jiont"),
-            ("ppl:jiont@0.5:0.1<=20", &names, "jiont"),
-            ("ppl:0.1@0.5:0.1<=20", &names, "0.1"),
             ("ppl:joint:ransac:0.1<=20", "expected one solver", "joint and ransac"),
             ("ppl:oracle:file:0.1<=20", "expected one source", "oracle and file"),
             ("ppl:joint:overlap@0.5:0.1<=20", "inlier ratio: expected none with neighbors by overlap, whose ratio is measured", "@0.5"),

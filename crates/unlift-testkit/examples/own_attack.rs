@@ -40,12 +40,7 @@ impl Source<3> for Brightness {
             // An error states the place, what was expected and what was found.
             return Err(Error::new("records", "one hidden point each", "paired lines"));
         }
-        let mut row = vec![0.0; descriptors.dim()];
-        let mut brightness = |at: usize| {
-            descriptors.read_row(at, &mut row);
-            row.iter().sum::<f32>()
-        };
-        let bright: Vec<f32> = (0..n).map(&mut brightness).collect();
+        let bright: Vec<f32> = descriptors.rows().map(|row| row.iter().sum()).collect();
         let near = |own: usize| {
             let unlike = |other: &usize| (bright[*other] - bright[own]).abs();
             let mut others: Vec<usize> = (0..n).filter(|&other| other != own).collect();
@@ -81,13 +76,10 @@ impl Solver<3> for Median {
             return Err(Error::new("records", "lines", released.obfuscation().family()));
         };
         // Feet, directions and positions are relative to `released.origin()`.
+        let line = |record: usize| (lines.foot()[record], lines.direction()[record]);
         let position = |slot: usize| {
-            let own = slot / released.slots_per_record();
-            let (foot, direction) = (lines.foot()[own], lines.direction()[own]);
-            let places = lists.of(slot).iter().map(|record| {
-                let other = record.index();
-                nearest(foot, direction, lines.foot()[other], lines.direction()[other])
-            });
+            let own @ (foot, direction) = line(slot / released.slots_per_record());
+            let places = lists.of(slot).iter().map(|record| nearest(own, line(record.index())));
             let mut places: Vec<f32> = places.filter(|t| t.is_finite()).collect();
             places.sort_unstable_by(f32::total_cmp);
             // A position that is not finite means that the point was not recovered.
@@ -100,7 +92,7 @@ impl Solver<3> for Median {
 }
 
 /// Returns where the line through `a` is nearest to that through `b`, by unit directions.
-fn nearest(a: [f32; 3], u: [f32; 3], b: [f32; 3], v: [f32; 3]) -> f32 {
+fn nearest((a, u): ([f32; 3], [f32; 3]), (b, v): ([f32; 3], [f32; 3])) -> f32 {
     let dot = |x: [f32; 3], y: [f32; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
     let between: [f32; 3] = std::array::from_fn(|c| b[c] - a[c]);
     let cosine = dot(u, v);

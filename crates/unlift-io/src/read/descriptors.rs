@@ -329,3 +329,46 @@ fn normalize(rows: &mut [f64], dim: usize, norm: f64) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No image, every image or every other one has its rows shifted by one.
+    #[test]
+    fn descriptors_of_real_maps_look_alike_within_tracks_unless_they_are_shifted() {
+        let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+        for name in [
+            "castle/features-sift.h5",
+            "redkitchen/features-sift.h5",
+            "redkitchen-aliked/features-aliked.h5",
+        ] {
+            let path = shared.join(name);
+            let Ok(source) = FeatureSource::open(&path) else {
+                println!("skipped: shared/data/{name} is not beside the repository");
+                continue;
+            };
+            let input = crate::read::open(path.parent().unwrap()).unwrap();
+            let at = |image: &Image| {
+                source.names().iter().position(|name| name.as_bytes() == image.name)
+            };
+            let (images, mut observations) = tracks(&path, &input).unwrap();
+            let is_there = |id| images.iter().any(|image| image.id == id && at(image).is_some());
+            observations.retain(|&(id, ..)| is_there(id));
+            let model = (images, observations);
+            for every in [usize::MAX, 1, 2] {
+                let result = mean(&path, &input, &model, |image| {
+                    let at = at(image).unwrap();
+                    let stored = source.get(at)?.descriptors.unwrap();
+                    let mut rows: Vec<u32> = (0..stored.len() as u32).collect();
+                    rows.rotate_left(usize::from((at + 1).is_multiple_of(every)));
+                    let changed = stored.select(&rows);
+                    Ok((changed.values().clone(), changed.dim()))
+                });
+                let error = result.err().map_or(String::new(), |error| error.to_string());
+                let is_refused = error.contains("more like their own point in other images");
+                assert_eq!(is_refused, every <= 2, "{name}, every {every}: {error}");
+            }
+        }
+    }
+}

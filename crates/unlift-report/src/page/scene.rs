@@ -303,7 +303,7 @@ impl SceneBox {
             return None;
         }
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let Self { low, high } = self;
+        let Self { low, high, .. } = self;
         Some([(low, low), (high, low), (high, high), (low, high)].map(|(first, second)| {
             let mut point = [offset; 3];
             point[u] = first[u];
