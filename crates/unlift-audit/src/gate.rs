@@ -523,11 +523,9 @@ mod tests {
         for (text, rows, expected) in [
             ("all:0.1<=20", &[row("olc", 1.0, 19.0), row("ppl", 0.5, 21.0), row("cp", 0.1, 3.0)][..], Some(21.0)),
             ("ppl@0.5:0.10<=20", others, Some(18.0)),
-            ("ppl@0.5:0.10<=20", &others[..2], None),
             ("ppl:0.10:gain<=15", &others[2..], Some(12.0)),
             // A measured ratio is not a requested one.
             ("ppl@0.5:0.10<=20", measured, None),
-            ("ppl:0.10<=20", measured, Some(18.0)),
             // The strongest attack decides unless one is named.
             ("ppl:0.10<=20", sources, Some(30.0)),
             ("ppl:ransac:0.10<=20", sources, Some(12.0)),

@@ -37,7 +37,6 @@ impl Source<3> for Brightness {
             return Err(Error::new("descriptors", "some", "none"));
         };
         if released.slots_per_record() != 1 {
-            // An error states the place, what was expected and what was found.
             return Err(Error::new("records", "one hidden point each", "paired lines"));
         }
         let bright: Vec<f32> = descriptors.rows().map(|row| row.iter().sum()).collect();

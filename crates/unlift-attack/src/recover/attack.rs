@@ -41,8 +41,9 @@ impl<const D: usize> Solver<D> for Builtin {
         lists: &Neighborhoods,
         options: &RecoverOptions,
     ) -> Result<Recovered<D>, Error> {
-        let solve: Solve<D> = SOLVE.of()?;
-        solve(*self, released, lists, options)
+        check(released, lists, options)?;
+        let options = *options;
+        Attack { released, lists, options, solver: *self, only_starts: false, known: &[] }.run()
     }
 
     fn reads_lists(&self) -> bool {
@@ -54,21 +55,12 @@ impl<const D: usize> Solver<D> for Builtin {
     }
 }
 
-type Solve<const D: usize> =
-    fn(Builtin, &Released<D>, &Neighborhoods, &RecoverOptions) -> Result<Recovered<D>, Error>;
+type Run<const D: usize> = fn(&Attack<'_, D>) -> Result<Recovered<D>, Error>;
+type Attacks<const D: usize> = Vec<(&'static str, Recovered<D>)>;
+type Alone<const D: usize> = fn(&Released<D>, &RecoverOptions) -> Result<Attacks<D>, Error>;
 
-crate::both! { SOLVE: Solve = solve }
-
-fn solve<const D: usize>(
-    solver: Builtin,
-    released: &Released<D>,
-    lists: &Neighborhoods,
-    options: &RecoverOptions,
-) -> Result<Recovered<D>, Error> {
-    check(released, lists, options)?;
-    let options = *options;
-    Attack { released, lists, options, solver, only_starts: false, known: &[] }.run()
-}
+crate::both! { RUN: Run = run }
+crate::both! { ALONE: Alone = alone }
 
 /// Runs our attacks on the records alone; returns the name and result of each. Planes and rays from one center yield nothing.
 ///
@@ -79,7 +71,15 @@ fn solve<const D: usize>(
 pub fn records_alone<const D: usize>(
     released: &Released<D>,
     options: &RecoverOptions,
-) -> Result<Vec<(&'static str, Recovered<D>)>, Error> {
+) -> Result<Attacks<D>, Error> {
+    let alone: Alone<D> = ALONE.of()?;
+    alone(released, options)
+}
+
+fn alone<const D: usize>(
+    released: &Released<D>,
+    options: &RecoverOptions,
+) -> Result<Attacks<D>, Error> {
     options.check()?;
     let none = Neighborhoods::empty(released.n_slots());
     // For paired lines, the order of the two points is unknown.
@@ -140,22 +140,26 @@ pub(super) fn check<const D: usize>(
     options.check()
 }
 
+fn run<const D: usize>(attack: &Attack<'_, D>) -> Result<Recovered<D>, Error> {
+    let Attack { released, lists, solver, .. } = *attack;
+    let at = |peaks: Option<Peaks>| peaks::at_peaks(released, lists, &peaks.unwrap_or_default());
+    match (solver, released.obfuscation()) {
+        (Builtin::Density, _) => at(published(released)),
+        (Builtin::Tomography, _) => at(tomography(released)),
+        (_, Obfuscation::Lines(_) | Obfuscation::Rays(_)) => {
+            attack.run_on(&LineFamily::new(released, lists))
+        }
+        (_, Obfuscation::AxisPlanes(planes)) => attack.run_on(&PlaneFamily::new(planes)),
+        (_, Obfuscation::AxisCandidates(candidates)) => {
+            attack.run_on(&CandidateFamily::new(candidates.position(), lists))
+        }
+    }
+}
+
 impl<const D: usize> Attack<'_, D> {
     fn run(&self) -> Result<Recovered<D>, Error> {
-        let Self { released, lists, .. } = *self;
-        let at =
-            |peaks: Option<Peaks>| peaks::at_peaks(released, lists, &peaks.unwrap_or_default());
-        match (self.solver, released.obfuscation()) {
-            (Builtin::Density, _) => at(published(released)),
-            (Builtin::Tomography, _) => at(tomography(released)),
-            (_, Obfuscation::Lines(_) | Obfuscation::Rays(_)) => {
-                self.run_on(&LineFamily::new(released, lists))
-            }
-            (_, Obfuscation::AxisPlanes(planes)) => self.run_on(&PlaneFamily::new(planes)),
-            (_, Obfuscation::AxisCandidates(candidates)) => {
-                self.run_on(&CandidateFamily::new(candidates.position(), lists))
-            }
-        }
+        let run: Run<D> = RUN.of()?;
+        run(self)
     }
 
     /// Runs the attack on records of one family: delta, consensus, [`joint`], exact constraints, confidence.

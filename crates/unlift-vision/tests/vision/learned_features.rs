@@ -141,8 +141,6 @@ fn options_out_of_range_are_named() {
     assert_eq!(error(none), "max_features: expected at least 1, found 0");
     let unknown = Extraction { min_score: f32::NAN, ..Extraction::ALIKED };
     assert_eq!(error(unknown), "min_score: expected 0 to below 1, found NaN");
-    let empty = Extraction { max_image_size: 0, ..Extraction::SIFT };
-    assert_eq!(error(empty), "max_image_size: expected 1 to 65536, found 0");
 }
 
 /// Loads a network with seeded random weights, whose descriptors have 16 values.
