@@ -1,4 +1,5 @@
-//! Ground truth: originals and secrets, for the owner only.
+//! Ground truth: originals and secrets, for the owner only. The attacker's crate, `unlift-attack`,
+//! does not depend on this one.
 
 use crate::geometry::frame::Bounds;
 use crate::{Error, Fingerprint, PointSet};

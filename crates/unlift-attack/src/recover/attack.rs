@@ -64,7 +64,8 @@ crate::both! { ALONE: Alone = alone }
 
 /// Runs our attacks on the records alone; returns the name and result of each. Planes and rays from one center yield nothing.
 ///
-/// Of a sample, less would be recovered. On lines the published attack recovered less than tomography (docs/benchmarks.md).
+/// They read the whole map, because less can be recovered of a sample. The published attack runs on rays only: on lines it recovered less
+/// than tomography (docs/benchmarks.md).
 ///
 /// # Errors
 /// When `options` are out of range.

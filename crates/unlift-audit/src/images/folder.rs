@@ -38,8 +38,8 @@ pub(super) fn open(root: &Path, extraction: &Extraction) -> Result<FeatureSource
         return Err(match listing.refused.pop() {
             Some(refused) => refused,
             None => {
-                let only = if others.is_empty() { "none" } else { "only " };
-                Error::new(root, "", "JPEG, PNG or WebP photos", format!("{only}{others}"))
+                let found = if others.is_empty() { "none" } else { &format!("only {others}") };
+                Error::new(root, "", "JPEG, PNG or WebP photos", found)
             }
         }
         .into());

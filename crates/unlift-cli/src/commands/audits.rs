@@ -18,7 +18,7 @@ use unlift_audit::inversion::{Inversion, MapInversion};
 use unlift_audit::localization::Localize;
 use unlift_audit::{
     Again, Audit, Audited, Hidden, Images, Input, Map, Maps, Output, Preparation, Prepared,
-    Request, Sequence, Tiles, bail, by_point, check_thresholds, distinct, released,
+    Progress as _, Request, Sequence, Tiles, bail, by_point, check_thresholds, distinct, released,
 };
 use unlift_io::hash::hash_file;
 use unlift_io::outputs::Rules;
@@ -159,8 +159,18 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
         let descriptors = (prepared.descriptors.as_ref(), "(--descriptors FILE)");
         let points = prepared.original.reveal();
         let mut plan = request.of_map(usual, points, descriptors, &mut audit)?;
-        let measure = inversion.clone().map(|measure| measure as Arc<dyn Measure<3>>);
-        plan.measures.extend(measure);
+        if let Some(inversion) = &inversion {
+            let attacks = match has_ratios {
+                true => plan.rows_per_scheme(),
+                false => plan.neighbors.len() * plan.solvers.len(),
+            };
+            let (schemes, photos) = (plan.schemes.len(), inversion.n_photos());
+            let n = photos * schemes * attacks * plan.repeats as usize;
+            progress.say(&format!(
+                "note: {n} pictures: {photos} photos x {attacks} attacks x {schemes} schemes"
+            ));
+            plan.measures.push(Arc::clone(inversion) as Arc<dyn Measure<3>>);
+        }
         let mut map = Map { plan, inversion, ..Map::new(&prepared) };
         if let Some(path) = &args.localize {
             if prepared.cameras.views.is_empty() {

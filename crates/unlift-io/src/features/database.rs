@@ -74,13 +74,12 @@ impl Database {
     }
 
     pub fn descriptors(&self, name: &[u8]) -> Result<(Values, usize), Error> {
-        let rows = self.matrix(name, "descriptors")?.map(|(_, values, dim)| (values, dim));
-        rows.ok_or_else(|| self.error(name, "descriptors", "none"))
+        self.matrix(name, "descriptors")?.ok_or_else(|| self.error(name, "descriptors", "none"))
     }
 
-    /// Returns the descriptors or the keypoints (floats) of an image: their number, the values and
-    /// the number of values of each. `None` if `table` has no row for the image.
-    fn matrix(&self, name: &[u8], table: &str) -> Result<Option<(usize, Values, usize)>, Error> {
+    /// Returns the descriptors or the keypoints (floats) of an image, and the number of values of
+    /// each. `None` if `table` has no row for the image.
+    fn matrix(&self, name: &[u8], table: &str) -> Result<Option<(Values, usize)>, Error> {
         let image_id = self.image_id(name)?;
         let of_keypoints = table == "keypoints";
         let kind = if self.has_type && !of_keypoints { "type" } else { "0" };
@@ -110,10 +109,10 @@ impl Database {
             return Err(self.error(name, expected, format!("{} bytes", data.len())));
         }
         if are_bytes {
-            return Ok(Some((n, Values::U8(data), row_bytes)));
+            return Ok(Some((Values::U8(data), row_bytes)));
         }
         let floats = data.as_chunks().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
-        Ok(Some((n, Values::F32(floats), row_bytes / 4)))
+        Ok(Some((Values::F32(floats), row_bytes / 4)))
     }
 
     fn row<T>(
@@ -145,7 +144,7 @@ impl Database {
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         let name = &self.image_ids[at].0[..];
         let size = self.size(name)?;
-        let Some((n, Values::F32(values), columns)) = self.matrix(name, "keypoints")? else {
+        let Some((Values::F32(values), columns)) = self.matrix(name, "keypoints")? else {
             return Err(self.error(name, "keypoints", "none"));
         };
         let descriptors = self.matrix(name, "descriptors")?;
@@ -165,12 +164,13 @@ impl Database {
             let (scales, turns) = values.chunks(columns).map(shape).unzip();
             (image.scales, image.orientations_deg) = (Some(scales), Some(turns));
         }
-        if let Some((found, values, dim)) = descriptors {
+        if let Some((values, dim)) = descriptors {
+            let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
+            let descriptors = Descriptors::try_new(values, dim).map_err(wrong)?;
+            let (n, found) = (image.keypoints.len(), descriptors.len());
             if found != n {
                 return Err(self.error(name, format!("{n} descriptors, one per keypoint"), found));
             }
-            let wrong = |error: unlift::Error| self.error(name, error.expected(), error.found());
-            let descriptors = Descriptors::try_new(values, dim).map_err(wrong)?;
             image.descriptors = Some(descriptors);
         }
         Ok(image)

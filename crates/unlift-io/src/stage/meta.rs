@@ -23,6 +23,7 @@ pub(super) const VERSION: u64 = 1;
 
 const KEYS: &str = "kind version unit family scheme fingerprint rows_by lists_by slots_per_record delta epsilon of_bytes \
                     confidence_unknown";
+
 #[derive(Clone, Debug)]
 pub(super) struct Meta<'a> {
     path: &'a Path,

@@ -33,8 +33,9 @@ impl Document {
             ("scale_m_per_unit", self.input.scale_m_per_unit),
             ("unit_in_map_units", self.input.unit_in_map_units),
         ] {
-            let length = length.unwrap_or(1.0);
-            expect(length > 0.0, format!("input.{field}"), "a number above zero", length)?;
+            if let Some(length) = length.filter(|length| *length <= 0.0) {
+                return invalid(format!("input.{field}"), "a number above zero", length);
+            }
         }
         for (i, row) in self.results.iter().enumerate() {
             let place = format!("results[{i}]");
@@ -44,40 +45,47 @@ impl Document {
                     && other.inlier_ratio == row.inlier_ratio
                     && other.k == row.k
             };
-            let same = self.results[..i].iter().position(is_same);
-            let found = format!("the combination of results[{}] again", same.unwrap_or(i));
-            expect(same.is_none(), place, "a combination of its own", found)?;
+            if let Some(j) = self.results[..i].iter().position(is_same) {
+                let found = format!("the combination of results[{j}] again");
+                return invalid(place, "a combination of its own", found);
+            }
         }
         for (i, gate) in self.gates.iter().enumerate() {
-            let is_known = gate.found_percent.is_some() && gate.reason.is_none();
-            let expected = "false where a figure is not known";
-            expect(is_known || !gate.passed, format!("gates[{i}].passed"), expected, true)?;
+            if gate.passed && (gate.found_percent.is_none() || gate.reason.is_some()) {
+                let expected = "false where a figure is not known";
+                return invalid(format!("gates[{i}].passed"), expected, true);
+            }
         }
         for (i, missing) in self.not_audited.iter().enumerate() {
-            let mut rows = self.results.iter();
-            let has_rows =
-                missing.neighbors.is_none() && rows.any(|of| of.scheme == missing.scheme);
-            let (place, found) = (format!("not_audited[{i}].scheme"), &missing.scheme);
-            let expected = "a scheme without rows in results";
-            expect(!has_rows, place, expected, format!("{found}, which has rows"))?;
+            let has_rows = |row: &Row| row.scheme == missing.scheme;
+            if missing.neighbors.is_none() && self.results.iter().any(has_rows) {
+                let found = format!("{}, which has rows", missing.scheme);
+                let expected = "a scheme without rows in results";
+                return invalid(format!("not_audited[{i}].scheme"), expected, found);
+            }
         }
-        let images = self.images.iter().enumerate();
-        let images = images.map(|(i, of)| (format!("images[{i}].rows"), of.rows.len(), true));
-        let tiles = self.tiles.iter().enumerate().map(|(i, tile)| {
-            (format!("tiles[{i}].recovered_percent"), tile.recovered_percent.len(), false)
-        });
-        let times = ("run.seconds.rows".to_owned(), self.run.seconds.rows.len(), true);
-        // These lists have one entry per row, or may be empty.
-        let n_rows = self.results.len();
-        for (place, n, may_be_empty) in images.chain(tiles).chain([times]) {
-            let fits = n == n_rows || (n == 0 && may_be_empty);
-            expect(fits, place, format!("{n_rows} rows, as in results"), n)?;
+        for (i, image) in self.images.iter().enumerate() {
+            self.check_rows(format!("images[{i}].rows"), image.rows.len(), true)?;
         }
+        for (i, tile) in self.tiles.iter().enumerate() {
+            let n = tile.recovered_percent.len();
+            self.check_rows(format!("tiles[{i}].recovered_percent"), n, false)?;
+        }
+        self.check_rows("run.seconds.rows".to_owned(), self.run.seconds.rows.len(), true)?;
         let whole = serde_json::to_value(self)?;
         for name in ["results", "break_even", "images", "tiles", "localization"] {
             whole.get(name).map_or(Ok(()), |part| shares(name, part, None))?;
         }
         Ok(())
+    }
+
+    /// Checks that a list has one entry per row of the results.
+    fn check_rows(&self, place: String, n: usize, may_be_empty: bool) -> Result<(), Error> {
+        let expected = self.results.len();
+        if n == expected || (n == 0 && may_be_empty) {
+            return Ok(());
+        }
+        invalid(place, format!("{expected} rows, as in results"), n)
     }
 }
 
@@ -91,8 +99,10 @@ fn all_finite<T: Serialize + DeserializeOwned + PartialEq>(
 /// Checks that all numbers of a part are finite: JSON has neither NaN nor infinity, so that what is read from its text differs
 /// from it.
 fn finite<T: Serialize + DeserializeOwned + PartialEq>(place: &str, part: &T) -> Result<(), Error> {
-    let read = serde_json::from_value::<T>(serde_json::to_value(part)?);
-    expect(read.is_ok_and(|read| read == *part), place, "finite numbers", "NaN or infinity")
+    match serde_json::from_value::<T>(serde_json::to_value(part)?) {
+        Ok(read) if read == *part => Ok(()),
+        _ => invalid(place, "finite numbers", "NaN or infinity"),
+    }
 }
 
 fn check_row(place: &str, row: &Row) -> Result<(), Error> {
@@ -106,20 +116,25 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         ("records_alone_percent", alone, has_alone),
         ("records_alone_by", by, has_alone),
     ] {
-        let is_listed = !is_needed || keys.as_ref() == Some(&thresholds);
-        let found = keys.map_or_else(|| "nothing".to_owned(), |keys| listed(&keys));
-        let expected = format!("the thresholds {}", listed(&thresholds));
-        expect(is_listed, format!("{place}.{field}"), expected, found)?;
+        if is_needed && keys.as_ref() != Some(&thresholds) {
+            let found = keys.map_or_else(|| "nothing".to_owned(), |keys| listed(&keys));
+            let expected = format!("the thresholds {}", listed(&thresholds));
+            return invalid(format!("{place}.{field}"), expected, found);
+        }
     }
     if let (Some(sure), Some(reason)) = (row.sure_percent, &row.sure_unknown) {
         let expected = format!("null, as sure_unknown says {reason:?}");
-        expect(false, format!("{place}.sure_percent"), expected, sure)?;
+        return invalid(format!("{place}.sure_percent"), expected, sure);
     }
-    let (n_lost, n_points, lost) = (row.n_lost, row.n_points, row.lost.values().sum::<usize>());
+    let lost: usize = row.lost.values().sum();
     // Earlier versions wrote rounded means over repeats, whose sum may differ.
-    let adds_up = row.repeats != 1 || lost == n_lost;
-    expect(adds_up, format!("{place}.lost"), format!("a sum of {n_lost}"), lost)?;
-    expect(n_lost <= n_points, format!("{place}.n_lost"), format!("at most {n_points}"), n_lost)
+    if row.repeats == 1 && lost != row.n_lost {
+        return invalid(format!("{place}.lost"), format!("a sum of {}", row.n_lost), lost);
+    }
+    if row.n_lost > row.n_points {
+        return invalid(format!("{place}.n_lost"), format!("at most {}", row.n_points), row.n_lost);
+    }
+    Ok(())
 }
 
 /// Checks every number under a name of a percentage or a ratio: `highest` is its largest value. Figures of others, in `metrics`,
@@ -135,11 +150,12 @@ fn shares(place: &str, value: &Value, highest: Option<f64>) -> Result<(), Error>
             let mut items = items.iter().enumerate();
             items.try_for_each(|(i, item)| shares(&format!("{place}[{i}]"), item, highest))
         }
-        (Value::Number(number), Some(highest)) => {
-            let value = number.as_f64().unwrap_or(0.0);
-            let expected = format!("a number from 0 to {highest}");
-            expect((0.0..=highest).contains(&value), place, expected, value)
-        }
+        (Value::Number(number), Some(highest)) => match number.as_f64() {
+            Some(value) if !(0.0..=highest).contains(&value) => {
+                invalid(place, format!("a number from 0 to {highest}"), value)
+            }
+            _ => Ok(()),
+        },
         _ => Ok(()),
     }
 }
@@ -152,13 +168,10 @@ fn highest_of(name: &str) -> Option<f64> {
     }
 }
 
-/// Returns an error if a rule does not hold.
-fn expect(
-    holds: bool,
+fn invalid(
     place: impl Into<String>,
     expected: impl Into<String>,
     found: impl ToString,
 ) -> Result<(), Error> {
-    let (place, expected) = (place.into(), expected.into());
-    if holds { Ok(()) } else { Err(Error::Invalid { place, expected, found: found.to_string() }) }
+    Err(Error::Invalid { place: place.into(), expected: expected.into(), found: found.to_string() })
 }

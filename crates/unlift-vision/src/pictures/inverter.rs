@@ -159,7 +159,7 @@ impl Inverter {
     /// Makes the picture of points in an image of `size` (width, height), at half that size.
     ///
     /// # Errors
-    /// Those of [`feature_image`], and descriptors of another kind.
+    /// If the descriptors are of another kind, and when [`feature_image`] returns an error.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
         self.takes(points.descriptors)?;
         let features = feature_image(points, size, self.kind == DescriptorKind::Sift)?;

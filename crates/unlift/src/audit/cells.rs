@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
+use super::clock::{RowSeconds, Seconds};
 use super::lists::{Kept, Lists};
 use super::missing::{NotAudited, add_new, shortened};
 use super::observer::{Cell, Observer};
 use super::plan::{Plan, key_of, oracle_seed};
 use super::row::{Alone, Row, measure, within};
-use super::run::{RowSeconds, Seconds};
 use crate::evaluate::{Accuracy, Truth, blind, distinct_weights, evaluate, joined};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle;

@@ -6,11 +6,12 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 
 use super::cells::{Finished, Owned, Rows, of_item};
+use super::clock::{RowSeconds, Seconds};
 use super::missing::{NotAudited, add_new};
 use super::observer::{Observer, Silent};
 use super::plan::Plan;
 use super::row::{Alone, ByReason, Distinct, Parts, Row, places_within, within};
-use super::run::{Outcome, RowSeconds, Seconds};
+use super::run::Outcome;
 use super::share::{Shares, Threshold, merge};
 use crate::evaluate::{Accuracy, Reliability};
 use crate::truth::Original;

@@ -4,6 +4,7 @@
 
 mod break_even;
 mod cells;
+mod clock;
 mod lists;
 mod many;
 mod missing;
@@ -16,6 +17,7 @@ pub mod staged;
 
 pub use break_even::{Bound, BreakEven, STRONGEST, break_even};
 pub use cells::{check_laws, records_alone};
+pub use clock::{RowSeconds, Seconds};
 pub use many::{Item, Watcher, run_many};
 pub use missing::NotAudited;
 pub use observer::{Cell, Measure, Observer, Silent};
@@ -23,5 +25,5 @@ pub use plan::{NeighborsBy, Plan, PointNeighbors, Variant};
 pub use row::{
     Alone, ByReason, Distinct, Intervals, PERCENTILES, Parts, ReliabilityBin, Row, Spread, measure,
 };
-pub use run::{Outcome, RowSeconds, Seconds, run, run_released, scheme_called};
+pub use run::{Outcome, run, run_released, scheme_called};
 pub use share::{ByThreshold, Interval, Share, Shares, Threshold, WithInterval};

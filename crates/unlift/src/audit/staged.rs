@@ -3,11 +3,11 @@
 pub use super::plan::{key_of, oracle_seed};
 
 use super::cells::Finished;
+use super::clock::RowSeconds;
 use super::lists::{Kept, Lists};
 use super::many::{Pool, merge_counts};
 use super::plan::{NeighborsBy, Variant};
 use super::row::{ByReason, Row, dropped, measure};
-use super::run::RowSeconds;
 use super::share::Threshold;
 use crate::Error;
 use crate::evaluate::{blind, distinct_weights};

@@ -4,6 +4,7 @@
 //! rest for all: origin, normal form, order of records, slots and descriptors.
 
 mod change;
+mod changed;
 mod hide;
 mod mitigate;
 mod protect;
@@ -15,7 +16,8 @@ pub mod plane;
 pub mod ppl;
 pub mod ray;
 
-pub use change::{Change, Changed};
+pub use change::Change;
+pub use changed::Changed;
 pub use hide::obfuscate;
 pub use mitigate::Mitigation;
 pub use protect::Protection;

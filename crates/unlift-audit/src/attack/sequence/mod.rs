@@ -287,14 +287,27 @@ struct Attack<'a> {
     seed: u64,
 }
 
-/// Numbers of keypoints, and how many of them are right within the headline threshold: linked in three or more views, linked so by the
-/// model's tracks, and without a point of the service's map. Then links of which the model knows both keypoints.
-type Counts = [[usize; 2]; 4];
-
-fn count([n, right]: &mut [usize; 2], is_right: bool) {
-    *n += 1;
-    *right += usize::from(is_right);
+/// A number of keypoints or links, and how many of them are right.
+#[derive(Clone, Copy, Default)]
+struct Share {
+    n: usize,
+    right: usize,
 }
+
+impl Share {
+    fn count(&mut self, is_right: bool) {
+        self.n += 1;
+        self.right += usize::from(is_right);
+    }
+
+    fn percent(&self) -> Option<f64> {
+        (self.n > 0).then(|| 100.0 * self.right as f64 / self.n as f64)
+    }
+}
+
+/// Keypoints, right within the headline threshold: linked in three or more views, linked so by the model's tracks, and without a
+/// point of the service's map. Then links of which the model knows both keypoints.
+type Shares = [Share; 4];
 
 const NAMES: [&str; 3] = ["linked", "tracked", "new"];
 
@@ -329,24 +342,24 @@ impl Protected<'_> {
         let queries = (0..self.views.len()).into_par_iter().with_max_len(1);
         let solved = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
         let mut pooled = Pooled::new(&plan.thresholds);
-        let mut all = Counts::default();
-        for (query, (recovered, counts)) in solved.iter().enumerate() {
+        let mut all = Shares::default();
+        for (query, (recovered, shares)) in solved.iter().enumerate() {
             let (original, released) = (&self.views[query].original, &self.queries[query].released);
             pooled.add(recovered, original, &self.secrets[query], Some(released))?;
-            let sums = all.as_flattened_mut().iter_mut().zip(counts.as_flattened());
-            sums.for_each(|(sum, more)| *sum += more);
+            for (all, share) in all.iter_mut().zip(shares) {
+                *all = Share { n: all.n + share.n, right: all.right + share.right };
+            }
         }
         let missing = || unlift::Error::new("sequence", "keypoints", "none");
         let mut row = pooled.row().ok_or_else(missing)?;
-        let percent = |n: usize, of: usize| 100.0 * n as f64 / of.max(1) as f64;
+        let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
         let label = &plan.thresholds[plan.headline].label;
-        for (name, [n, right]) in NAMES.into_iter().zip(all) {
-            row.metrics.insert(format!("{name}_percent"), percent(n, row.n_points));
-            if n > 0 {
-                row.metrics.insert(format!("{name}_within_{label}_percent"), percent(right, n));
-            }
+        for (name, share) in NAMES.into_iter().zip(&all) {
+            row.metrics.insert(format!("{name}_percent"), of_all(share));
+            let within = share.percent().map(|of| (format!("{name}_within_{label}_percent"), of));
+            row.metrics.extend(within);
         }
-        row.inlier_ratio = percent(all[3][1], all[3][0]) / 100.0;
+        row.inlier_ratio = all[3].percent().unwrap_or(0.0) / 100.0;
         Ok(row)
     }
 
@@ -370,31 +383,31 @@ impl Protected<'_> {
         tracks: &Links,
         query: usize,
         headline: f64,
-    ) -> Result<(Recovered<2>, Counts), unlift::Error> {
+    ) -> Result<(Recovered<2>, Shares), unlift::Error> {
         let window = self.window(query, attack.n);
         let solved = self.solve(attack, query)?;
         let original = &self.views[query].original;
         let accuracy = evaluate(&solved.recovered, original, &self.secrets[query])?;
-        let mut counts = Counts::default();
+        let mut shares = Shares::default();
         for (slot, &error) in accuracy.errors().iter().enumerate() {
             let is_within = error <= headline;
             let point = self.point(query, slot);
-            let counted = [
+            let counts = [
                 solved.n_views[slot] >= LEAST_VIEWS,
                 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS,
                 point.is_none(),
             ];
-            for (of, _) in counts.iter_mut().zip(counted).filter(|(_, is)| *is) {
-                count(of, is_within);
+            for (share, _) in shares.iter_mut().zip(counts).filter(|(_, is)| *is) {
+                share.count(is_within);
             }
             let Some(point) = point else { continue };
             for (other, at) in attack.links.track(query, slot, &window) {
                 if let Some(other) = self.point(other as usize, at as usize) {
-                    count(&mut counts[3], point == other);
+                    shares[3].count(point == other);
                 }
             }
         }
-        Ok((solved.recovered, counts))
+        Ok((solved.recovered, shares))
     }
 
     /// Returns the `n` consecutive queries around `query`.

@@ -1,0 +1,67 @@
+//! A scheme with a mitigation or a protection of descriptors.
+
+use std::sync::Arc;
+
+use super::change::Change;
+use super::scheme::{Lifted, LocalPoints, Scheme};
+use crate::seed::Key;
+use crate::truth::{DropReason, Dropped};
+use crate::{Error, OriginalId};
+
+/// A scheme with a change. It is itself a scheme, so audits, gates and reports need nothing more.
+#[derive(Clone, Debug)]
+pub struct Changed<const D: usize> {
+    scheme: Arc<dyn Scheme<D>>,
+    change: Change,
+    name: String,
+}
+
+impl<const D: usize> Changed<D> {
+    /// Creates the scheme. Its name is the scheme's, followed by that of the change.
+    pub fn new(scheme: Arc<dyn Scheme<D>>, change: Change) -> Self {
+        let of_change = match &change {
+            Change::Mitigation(mitigation, _) => mitigation.name(),
+            Change::Protection(protection) => protection.name(),
+        };
+        Self { name: format!("{}_{of_change}", scheme.name()), scheme, change }
+    }
+
+    /// Returns every scheme under every change.
+    pub fn all(schemes: &[Arc<dyn Scheme<D>>], changes: &[Change]) -> Vec<Arc<dyn Scheme<D>>> {
+        let with = |change: &Change| {
+            let of = |scheme: &Arc<_>| Self::new(Arc::clone(scheme), change.clone());
+            schemes.iter().map(|scheme| Arc::new(of(scheme)) as Arc<_>).collect::<Vec<_>>()
+        };
+        changes.iter().flat_map(with).collect()
+    }
+}
+
+impl<const D: usize> Scheme<D> for Changed<D> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        self.scheme.parameters()
+    }
+
+    fn lift(&self, points: &LocalPoints<'_, D>, key: &Key) -> Result<Lifted<D>, Error> {
+        let Change::Mitigation(mitigation, tracks) = &self.change else {
+            return self.scheme.lift(points, key);
+        };
+        let n = points.positions.len();
+        let kept = mitigation.kept(n, tracks.as_deref(), key)?;
+        let thinned: Vec<_> = kept.iter().map(|&row| points.positions[row as usize]).collect();
+        let mut lifted = self.scheme.lift(&LocalPoints { positions: &thinned, ..*points }, key)?;
+        let dropped = lifted.dropped.iter_mut().map(|dropped| &mut dropped.original);
+        lifted.hidden.iter_mut().chain(dropped).for_each(|id| *id = OriginalId(kept[id.index()]));
+        let out = (0..n as u32).filter(|row| kept.binary_search(row).is_err()).map(OriginalId);
+        let out = out.map(|original| Dropped { original, reason: DropReason::Thinned });
+        lifted.dropped.extend(out);
+        Ok(lifted)
+    }
+
+    fn changes(&self) -> Vec<&Change> {
+        [self.scheme.changes(), vec![&self.change]].concat()
+    }
+}
