@@ -110,33 +110,22 @@ pub fn whole(
     range: RangeInclusive<i64>,
 ) -> PyResult<(Vec<i64>, Vec<usize>)> {
     let array = array(name, given, WHOLE)?;
-    let unsigned = array.getattr("dtype")?.getattr("kind")?.extract::<String>()? == "u";
-    // Use the widest type of the same signedness, because large values of uint64 would wrap in
-    // int64.
-    match unsigned {
-        true => within(name, &contiguous::<u64>(&array)?, dims, range),
-        false => within(name, &contiguous::<i64>(&array)?, dims, range),
-    }
-}
-
-fn within<T: Element + Copy + Display + TryInto<i64>>(
-    name: &str,
-    array: &Bound<'_, PyArrayDyn<T>>,
-    dims: &[usize],
-    range: RangeInclusive<i64>,
-) -> PyResult<(Vec<i64>, Vec<usize>)> {
-    let shape = array.shape().to_vec();
+    let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     if !dims.contains(&shape.len()) {
         let axes: Vec<String> = dims.iter().map(usize::to_string).collect();
         let expected = format!("an array of {} axes", axes.join(" or "));
         return Err(wrong(name, expected, shape_text(&shape)));
     }
-    let index = |&value: &T| match value.try_into() {
-        Ok(index) if range.contains(&index) => Ok(index),
-        _ => Err(wrong(name, format!("numbers from {} to {}", range.start(), range.end()), value)),
-    };
-    let values = array.readonly().as_slice()?.iter().map(index).collect::<PyResult<_>>()?;
-    Ok((values, shape))
+    // Large values of uint64 would wrap in int64.
+    let bounds: &[&str] = if shape.contains(&0) { &[] } else { &["min", "max"] };
+    for bound in bounds {
+        let value: i128 = array.call_method0(*bound)?.call_method0("item")?.extract()?;
+        if !i64::try_from(value).is_ok_and(|value| range.contains(&value)) {
+            let expected = format!("numbers from {} to {}", range.start(), range.end());
+            return Err(wrong(name, expected, value));
+        }
+    }
+    Ok((contiguous::<i64>(&array)?.readonly().as_slice()?.to_vec(), shape))
 }
 
 /// Returns whole numbers from 0 below `end`, from an array with one of `dims` axes, and its shape.

@@ -11,7 +11,7 @@ use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::Source;
 use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::{SCHEMES, Scheme, SchemeOptions};
-use unlift::recover::{Delta, Solver};
+use unlift::recover::{Delta, RecoverOptions, Solver};
 use unlift_audit::images::{Opened, Opening, Wanted};
 use unlift_audit::{
     Audit, Audited, Error, Gate, Images as ImagesInput, Input, Map as MapInput, Output, Request,
@@ -309,9 +309,7 @@ pub fn thresholds(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Threshold>> 
 
 /// Returns the distance within which a record supports a position.
 pub fn delta(given: Option<f64>) -> PyResult<Delta> {
-    match given {
-        None => Ok(Delta::Auto),
-        Some(length) if length.is_finite() && length > 0.0 => Ok(Delta::Fixed(length)),
-        Some(length) => Err(wrong("delta", "a number above 0, or None", length)),
-    }
+    let delta = given.map_or(Delta::Auto, Delta::Fixed);
+    RecoverOptions { delta, ..RecoverOptions::default() }.check().map_err(raised)?;
+    Ok(delta)
 }

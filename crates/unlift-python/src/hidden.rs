@@ -1,10 +1,11 @@
 //! Hidden maps: the released part, and the truth.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use unlift::released::{self, Obfuscation};
 use unlift::truth::{Original, Secret};
 use unlift_audit::check_file;
@@ -149,26 +150,23 @@ fn columns<'py, const D: usize>(
     py: Python<'py>,
     records: &Obfuscation<D>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let columns = PyDict::new(py);
-    match records {
+    let vectors = |rows: &[[f32; D]]| to_rows(py, rows.to_vec()).map(Bound::into_any);
+    let columns = match records {
         Obfuscation::Lines(lines) => {
-            columns.set_item("foot", to_rows(py, lines.foot().to_vec())?)?;
-            columns.set_item("direction", to_rows(py, lines.direction().to_vec())?)?;
+            vec![("foot", vectors(lines.foot())?), ("direction", vectors(lines.direction())?)]
         }
-        Obfuscation::Rays(rays) => {
-            columns.set_item("centers", to_rows(py, rays.centers().to_vec())?)?;
-            columns.set_item("center", to_array(py, rays.center().to_vec()))?;
-            columns.set_item("direction", to_rows(py, rays.direction().to_vec())?)?;
-        }
-        Obfuscation::AxisPlanes(planes) => {
-            columns.set_item("axis", to_array(py, planes.axis().to_vec()))?;
-            columns.set_item("offset", to_array(py, planes.offset().to_vec()))?;
-        }
-        Obfuscation::AxisCandidates(points) => {
-            columns.set_item("position", to_rows(py, points.position().to_vec())?)?;
-        }
-    }
-    Ok(columns)
+        Obfuscation::Rays(rays) => vec![
+            ("centers", vectors(rays.centers())?),
+            ("center", to_array(py, rays.center().to_vec()).into_any()),
+            ("direction", vectors(rays.direction())?),
+        ],
+        Obfuscation::AxisPlanes(planes) => vec![
+            ("axis", to_array(py, planes.axis().to_vec()).into_any()),
+            ("offset", to_array(py, planes.offset().to_vec()).into_any()),
+        ],
+        Obfuscation::AxisCandidates(points) => vec![("position", vectors(points.position())?)],
+    };
+    columns.into_py_dict(py)
 }
 
 /// What only the owner of a map has: its points, and the record that hides each.
@@ -210,14 +208,12 @@ impl Truth {
 
     /// Number of points without a record, by reason.
     #[getter]
-    fn dropped<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let counts = PyDict::new(py);
+    fn dropped(&self) -> BTreeMap<&'static str, usize> {
+        let mut counts = BTreeMap::new();
         for dropped in self.secret.dropped() {
-            let name = dropped.reason.name();
-            let n: usize = counts.get_item(name)?.map_or(Ok(0), |n| n.extract())?;
-            counts.set_item(name, n + 1)?;
+            *counts.entry(dropped.reason.name()).or_default() += 1;
         }
-        Ok(counts)
+        counts
     }
 
     fn __repr__(&self) -> String {

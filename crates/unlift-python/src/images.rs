@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyString;
 use unlift::OneLine;
 use unlift_audit::Error;
 use unlift_audit::images::FeatureSource;
@@ -35,7 +34,10 @@ impl Images {
         let by_name = given.clone();
         let mut names = Vec::new();
         for name in by_name.call_method0("keys")?.try_iter()? {
-            names.push(name_of(&name?)?);
+            let name = name?;
+            let text = name.extract::<String>();
+            let wrong = |_| wrong("images", "names that are texts", OneLine(&name));
+            names.push(text.map_err(wrong)?);
         }
         names.sort_unstable();
         let (by, by_name, keys) = (by.clone(), Arc::new(by_name.unbind()), names.clone());
@@ -69,13 +71,6 @@ fn is_mapping(given: &Bound<'_, PyAny>) -> PyResult<bool> {
     Ok(given.hasattr("keys")? && given.hasattr("__getitem__")?)
 }
 
-fn name_of(name: &Bound<'_, PyAny>) -> PyResult<String> {
-    let Ok(text) = name.cast::<PyString>() else {
-        return Err(wrong("images", "names that are texts", OneLine(name.repr()?)));
-    };
-    text.extract()
-}
-
 /// Converts the dict of one image to features.
 fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures> {
     if !is_mapping(given)? {
@@ -101,7 +96,7 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
         let given = needed(key)?;
         let side = given.extract::<u32>().ok().filter(|side| *side > 0);
         let expected = "a whole number of pixels above 0";
-        side.ok_or_else(|| wrong(&at(place, key), expected, OneLine(text_of(&given))))
+        side.ok_or_else(|| wrong(&at(place, key), expected, OneLine(&given)))
     };
     let size = [side("width")?, side("height")?];
     let place = at(place, "descriptors");
@@ -114,8 +109,4 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
 
 fn at(place: &str, key: &str) -> String {
     format!("{place}[{key:?}]")
-}
-
-fn text_of(given: &Bound<'_, PyAny>) -> String {
-    given.repr().map_or_else(|_| "no number".to_owned(), |text| text.to_string())
 }

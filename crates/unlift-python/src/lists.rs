@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use unlift::neighbors::oracle::{Noise, Outliers, TrueNeighbors, search};
+use unlift::audit::staged::oracle_lists;
+use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{self, Needs};
 use unlift::released;
@@ -202,13 +203,11 @@ pub fn oracle(
     noise: &str,
     seed: u64,
 ) -> PyResult<Neighborhoods> {
-    let noise = Noise::from_name(noise).map_err(raised)?;
-    let truth = hidden.truth.clone();
+    let how = (Noise::from_name(noise).map_err(raised)?, inlier_ratio, k);
+    let (released, truth) = (hidden.released.clone().of_map()?, hidden.truth.clone());
     let lists = threads::run(py, None, None, move || {
-        let knn = search(&truth.original)?;
-        let near = TrueNeighbors::new(&knn, &truth.secret, k)?;
-        let outliers = Outliers::new(noise, &near, &knn, &truth.secret, seed)?;
-        near.lists(inlier_ratio, &outliers, seed)
+        let hidden = ((*released).clone(), (*truth.secret).clone());
+        oracle_lists(&truth.original, &hidden, how, seed)
     })?;
     Ok(Neighborhoods(Arc::new(lists)))
 }

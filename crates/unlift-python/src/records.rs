@@ -39,42 +39,30 @@ impl<const D: usize> Hiding<D> {
         Ok(Self { obfuscation, slots_per_record, hidden: rows, swapped_axis: None })
     }
 
-    /// Converts to records of `n` points; points without a record are dropped.
+    /// Converts to records of `n` points. Points that `hidden` does not name are dropped.
     pub fn lifted(self, n: usize, name: &str) -> Result<Lifted<D>, Error> {
-        let Some(hidden) = self.hidden else {
-            let found = self.obfuscation.len();
-            if found != n {
-                let expected = format!("{n} records, one per point, or `hidden`");
-                return Err(Error::new(name, expected, found.to_string()));
-            }
-            let lifted = Lifted::one_each(self.obfuscation);
-            return Ok(Lifted { swapped_axis: self.swapped_axis, ..lifted });
-        };
+        let Self { obfuscation, slots_per_record, hidden, swapped_axis } = self;
+        let n_records = obfuscation.len();
+        if hidden.is_none() && n_records != n {
+            let expected = format!("{n} records, one per point, or `hidden`");
+            return Err(Error::new(name, expected, n_records.to_string()));
+        }
+        let hidden = hidden.unwrap_or_else(|| (0..n_records as u32).collect());
         let mut is_hidden = vec![false; n];
         for &row in &hidden {
-            match is_hidden.get_mut(row as usize) {
-                Some(is_hidden) if !*is_hidden => *is_hidden = true,
-                Some(_) => {
-                    let found = format!("point {row} twice");
-                    return Err(Error::new(name, "every point in one record", found));
-                }
-                None => {
-                    let expected = format!("points from 0 to {}", n.saturating_sub(1));
-                    return Err(Error::new(name, expected, row.to_string()));
-                }
-            }
+            let place = is_hidden.get_mut(row as usize).ok_or_else(|| {
+                Error::new(name, format!("points from 0 to {}", n.saturating_sub(1)), row)
+            })?;
+            *place = true;
         }
-        let left = (0..n).filter(|&row| !is_hidden[row]);
-        let dropped = left.map(|row| Dropped {
-            original: OriginalId::from_index(row),
-            reason: DropReason::Other,
-        });
+        let reason = DropReason::Other;
+        let left = (0..n).filter(|&row| !is_hidden[row]).map(OriginalId::from_index);
         Ok(Lifted {
-            obfuscation: self.obfuscation,
-            slots_per_record: self.slots_per_record,
-            hidden: hidden.iter().map(|&row| OriginalId::from_index(row as usize)).collect(),
-            swapped_axis: self.swapped_axis,
-            dropped: dropped.collect(),
+            obfuscation,
+            slots_per_record,
+            hidden: hidden.into_iter().map(OriginalId).collect(),
+            swapped_axis,
+            dropped: left.map(|original| Dropped { original, reason }).collect(),
         })
     }
 }

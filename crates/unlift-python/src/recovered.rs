@@ -11,7 +11,7 @@ use unlift::recover::{Builtin, RecoverOptions, Recovered as Found, recover as so
 use unlift_audit::Checked;
 use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
-use crate::arrays::{raised, to_array, to_rows, wrong};
+use crate::arrays::{raised, to_array, to_rows};
 use crate::audit::{delta, thresholds};
 use crate::hidden::{Hidden, released_of, save, truth_of};
 use crate::lists::Neighborhoods;
@@ -120,10 +120,6 @@ pub fn recover(
         Some(given) => solver_of::<3>(given, &by)?,
         None => Arc::new(Builtin::Joint),
     };
-    let fingerprint = Some(released.fingerprint());
-    if lists.0.about().map.is_some_and(|map| Some(map) != fingerprint) {
-        return Err(wrong("lists", "lists of this released map", "those of another"));
-    }
     let lists = Arc::clone(&lists.0);
     let work = move || solve(&released, &lists, &*solver, &options);
     let recovered = threads::run(py, threads, Some(&by.waiting), work);
