@@ -43,7 +43,7 @@ impl Tried {
     /// Returns what `plan` tries; `described` is true if there are descriptors. True neighbors alone replace a source, as no source
     /// is better.
     pub fn by<const D: usize>(plan: &Plan<D>, described: bool) -> Self {
-        let described = described || plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
+        let described = described || plan.own_sources().any(|by| by.needs() != Needs::Nothing);
         let is_best = |by: &NeighborsBy<D>| match by {
             NeighborsBy::Oracle => plan.inlier_ratios.contains(&1.0),
             by => by.name() == sources::BY_DESCRIPTORS.name,

@@ -138,7 +138,7 @@ pub fn check_fit<const D: usize>(
     for source in plan.own_sources() {
         let wrong = |text: String| Error::request(format!("--neighbors {}: {text}", source.name()));
         match descriptors.map(|descriptors| source.takes(descriptors)) {
-            None if source.needs() == Needs::Descriptors => {
+            None if source.needs() != Needs::Nothing => {
                 let expected = format!("expected descriptors {place}");
                 return Err(wrong(format!("{}, found none", expected.trim_end())));
             }

@@ -85,7 +85,7 @@ impl<const D: usize> Source<D> for ByDescriptors {
     }
 
     fn needs(&self) -> Needs {
-        Needs::Descriptors
+        Needs::DescriptorsAlone
     }
 
     fn k(&self, released: &Released<D>) -> usize {
@@ -113,10 +113,6 @@ impl<const D: usize> Source<D> for ByDescriptors {
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
         candidates::<D>(Some(descriptors)).0.takes(descriptors)
-    }
-
-    fn reads_descriptors_alone(&self) -> bool {
-        true
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {

@@ -15,37 +15,28 @@ const CLOUD_COMMENT: &str = "unlift";
 const MODEL_MARK: &str = "# unlift model";
 
 /// Returns an error if a coordinate of one of the `points` is not finite.
-fn finite<const D: usize>(
-    path: &Path,
-    points: impl IntoIterator<Item = [f64; D]>,
-) -> Result<(), Error> {
-    let is_wrong = |point: &[f64; D]| !point.iter().all(|x| x.is_finite());
-    let Some((at, point)) = points.into_iter().enumerate().find(|(_, point)| is_wrong(point))
-    else {
-        return Ok(());
-    };
-    Err(Error::new(path, format!("point {at}"), "finite coordinates", format!("{point:?}")))
+fn finite(path: &Path, points: impl IntoIterator<Item = [f64; 3]>) -> Result<(), Error> {
+    for (at, point) in points.into_iter().enumerate() {
+        if !point.iter().all(|x| x.is_finite()) {
+            let place = format!("point {at}");
+            return Err(Error::new(path, place, "finite coordinates", format!("{point:?}")));
+        }
+    }
+    Ok(())
 }
 
-/// Writes `points` `(n, D)` as binary little-endian PLY.
-///
-/// The columns are `double x, y, z` (z is 0 in 2D).
+/// Writes `points` `(n, 3)` as binary little-endian PLY with columns `double x, y, z`.
 ///
 /// # Errors
 /// When a coordinate is not finite.
-pub fn write_points<const D: usize>(path: &Path, points: &[[f64; D]]) -> Result<(), Error> {
+pub fn write_points(path: &Path, points: &[[f64; 3]]) -> Result<(), Error> {
     finite(path, points.iter().copied())?;
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}")?;
         writeln!(w, "element vertex {}", points.len())?;
         writeln!(w, "property double x\nproperty double y\nproperty double z\nend_header")?;
-        points.iter().flat_map(in_space).try_for_each(|value| w.write_all(&value.to_le_bytes()))
+        points.as_flattened().iter().try_for_each(|value| w.write_all(&value.to_le_bytes()))
     })
-}
-
-/// Returns the coordinates of a point in 3D; in 2D, z is 0.
-fn in_space<const D: usize>(point: &[f64; D]) -> [f64; 3] {
-    std::array::from_fn(|axis| point.get(axis).copied().unwrap_or(0.0))
 }
 
 /// Writes `cameras.txt`.
@@ -89,8 +80,7 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
     })
 }
 
-/// Writes `points3D.txt`: the points of `points` `(n, 3)` that have a position, in gray. The id is
-/// the row, counted from 1.
+/// Writes `points3D.txt`: the points `(n, 3)` that have a position, in gray. Ids are rows from 1.
 ///
 /// # Errors
 /// When a coordinate is not finite.

@@ -31,7 +31,7 @@ impl<const D: usize> Source<D> for Overlap {
     }
 
     fn needs(&self) -> Needs {
-        Needs::Descriptors
+        Needs::DescriptorsAlone
     }
 
     fn k(&self, _: &Released<D>) -> usize {
@@ -57,10 +57,6 @@ impl<const D: usize> Source<D> for Overlap {
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
         check(descriptors)
-    }
-
-    fn reads_descriptors_alone(&self) -> bool {
-        true
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {

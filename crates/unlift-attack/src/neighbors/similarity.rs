@@ -37,7 +37,7 @@ impl<const D: usize> Source<D> for Similarity {
     }
 
     fn needs(&self) -> Needs {
-        Needs::Descriptors
+        Needs::DescriptorsAlone
     }
 
     fn k(&self, released: &Released<D>) -> usize {
@@ -71,10 +71,6 @@ impl<const D: usize> Source<D> for Similarity {
             }
             None => ranked_by(&Cosine, Rows::new(released, k)?, walk, (released, k), kept),
         }
-    }
-
-    fn reads_descriptors_alone(&self) -> bool {
-        true
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {

@@ -16,6 +16,9 @@ pub enum Needs {
     Nothing,
     /// The descriptors that are released with the records.
     Descriptors,
+    /// These descriptors alone, whatever their order, without the records and the seed. An audit makes lists once for all schemes that
+    /// release the same descriptors ([`KeptLists`](super::KeptLists)).
+    DescriptorsAlone,
 }
 
 /// Makes lists of near records from what is released. An audit takes `Arc<dyn Source<D>>`; [`SOURCES`] lists the sources of this crate.
@@ -53,8 +56,8 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
     fn supports(&self, released: &Released<D>) -> Result<(), Error> {
         match (self.needs(), released.descriptors()) {
             (Needs::Nothing, _) => Ok(()),
-            (Needs::Descriptors, Some(descriptors)) => self.takes(descriptors),
-            (Needs::Descriptors, None) => Err(lacks_descriptors(self.name())),
+            (_, Some(descriptors)) => self.takes(descriptors),
+            (_, None) => Err(lacks_descriptors(self.name())),
         }
     }
 
@@ -71,12 +74,6 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
     ) -> Result<Neighborhoods, Error> {
         let _ = kept;
         self.lists(released, k, seed)
-    }
-
-    /// Whether lists follow from the descriptors alone, whatever their order, without the records and the seed. Then an audit makes
-    /// them once for all schemes that release the same descriptors ([`KeptLists`](super::KeptLists)).
-    fn reads_descriptors_alone(&self) -> bool {
-        false
     }
 
     /// Returns a note for users about lists for `n_slots` hidden points, if there is one.
@@ -255,10 +252,6 @@ impl<const D: usize> Source<D> for Chosen<D> {
 
     fn supports(&self, released: &Released<D>) -> Result<(), Error> {
         self.source.supports(released).map_err(|error| error.within(self.name()))
-    }
-
-    fn reads_descriptors_alone(&self) -> bool {
-        self.source.reads_descriptors_alone()
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {

@@ -64,8 +64,7 @@ crate::both! { ALONE: Alone = alone }
 
 /// Runs our attacks on the records alone; returns the name and result of each. Planes and rays from one center yield nothing.
 ///
-/// They read the whole map, because less can be recovered of a sample. The published attack runs on rays only: on lines it recovered less
-/// than tomography (docs/benchmarks.md).
+/// They read the whole map: a sample gives less. The published attack runs on rays only: on lines, tomography recovers more.
 ///
 /// # Errors
 /// When `options` are out of range.

@@ -275,8 +275,8 @@ impl Opened {
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
         // Extracted features always have descriptors.
-        let uses = opening.uses_descriptors
-            || plan.own_sources().any(|by| by.needs() == Needs::Descriptors);
+        let uses =
+            opening.uses_descriptors || plan.own_sources().any(|by| by.needs() != Needs::Nothing);
         if uses
             && opened.source.is_file()
             && let Some(first) = opened.source.first(&opened.chosen)

@@ -137,7 +137,7 @@ fn read(
     let place = format!("image {}", features.name.escape_debug());
     let wrong = |expected: &str, found: &str| Error::new(path, place.clone(), expected, found);
     let sources = plan.into_iter().flat_map(Plan::own_sources);
-    let needy: Vec<_> = sources.filter(|by| by.needs() == Needs::Descriptors).collect();
+    let needy: Vec<_> = sources.filter(|by| by.needs() != Needs::Nothing).collect();
     // Measures may use descriptors, too. These are most of the memory of an image.
     let keeps = !needy.is_empty() || plan.is_none_or(|plan| !plan.measures.is_empty());
     // An image without keypoints needs nothing.

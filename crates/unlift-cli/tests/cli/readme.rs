@@ -51,6 +51,9 @@ fn every_command_line_of_the_readme_runs_as_it_is_written() {
     let place = Place::with_photos();
     write_project(&place);
     write_points(&place.path("cloud.ply"), &synthetic::room(2, 400).points).unwrap();
+    let names = ["PROJECT/database.db", "PROJECT/sparse/0/points3D.txt", "cloud.ply"];
+    let inputs = || names.map(|name| place.bytes(name));
+    let before = inputs();
     for line in lines.into_iter().filter(|line| !builds.contains(line)) {
         let line = line.replacen("cargo run --release --", "unlift", 1);
         assert!(line.starts_with("unlift "), "this test cannot run a line of the README: {line}");
@@ -59,5 +62,8 @@ fn every_command_line_of_the_readme_runs_as_it_is_written() {
         // A gate may fail, and must report that; nothing else may fail.
         let failed = line.contains("--gate") && stdout.contains("FAILED");
         assert_eq!(run.status.code(), Some(i32::from(failed)), "{line}\n{stdout}{stderr}");
+        let out = line.split_whitespace().skip_while(|word| *word != "--out").nth(1);
+        assert!(out.is_none_or(|out| place.path(out).exists()), "{line}");
     }
+    assert!(inputs() == before, "a line of the README changed what a reader has");
 }

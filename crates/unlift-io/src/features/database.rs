@@ -77,8 +77,7 @@ impl Database {
         self.matrix(name, "descriptors")?.ok_or_else(|| self.error(name, "descriptors", "none"))
     }
 
-    /// Returns the descriptors or the keypoints (floats) of an image, and the number of values of
-    /// each. `None` if `table` has no row for the image.
+    /// Returns the rows of an image and their width; `None` if `table` has none. Keypoints are floats.
     fn matrix(&self, name: &[u8], table: &str) -> Result<Option<(Values, usize)>, Error> {
         let image_id = self.image_id(name)?;
         let of_keypoints = table == "keypoints";

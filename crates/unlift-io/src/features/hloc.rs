@@ -37,8 +37,7 @@ const UNCERTAINTY: &str = "uncertainty";
 pub(super) struct Hloc {
     path: PathBuf,
     budget: Budget,
-    /// Paths and open handles of all groups that contain arrays directly, sorted by path. Finding a
-    /// group by path would search all names of the groups above it.
+    /// Paths and open handles of groups with arrays, by path: a search by path reads all names above.
     groups: Groups,
     /// Errors about links that lead to no group.
     pub broken: Vec<Error>,

@@ -218,8 +218,7 @@ fn of_poses(names: &[&[u8]]) -> Option<String> {
 
 const POSES: &str = "a trajectory, poses of cameras";
 
-/// Returns true if the first row has three coordinates, and is not a truncated row of COLMAP's
-/// points (id and two coordinates).
+/// Returns true if the first row has three coordinates, and is no cut row of COLMAP (id and two).
 pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
     let mut lines = Lines::open(path)?;
     if !lines.advance_to_data()? {

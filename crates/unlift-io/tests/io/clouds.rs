@@ -285,9 +285,9 @@ fn the_points_of_an_archive_are_read() {
 fn points_are_written_if_they_are_finite() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    clouds::write_points(&path("p.ply"), &[[1.0, 2.0], [-1e-9, 4e6]]).unwrap();
-    // Those of an image are in the plane.
-    assert_eq!(read::open(&path("p.ply")).unwrap().positions, [[1.0, 2.0, 0.0], [-1e-9, 4e6, 0.0]]);
+    let points = [[1.0, 2.0, 3.0], [-1e-9, 4e6, 0.0]];
+    clouds::write_points(&path("p.ply"), &points).unwrap();
+    assert_eq!(read::open(&path("p.ply")).unwrap().positions, points);
     let error = clouds::write_points(&path("a"), &[[0.0, f64::NAN, 0.0]]).unwrap_err();
     let line = "a: point 0: expected finite coordinates, found [0.0, NaN, 0.0]";
     assert_eq!(shown(folder.path(), &error), line);

@@ -52,7 +52,7 @@ impl<const D: usize> Source<D> for Learned {
     }
 
     fn needs(&self) -> Needs {
-        Needs::Descriptors
+        Needs::DescriptorsAlone
     }
 
     fn k(&self, released: &Released<D>) -> usize {
@@ -83,10 +83,6 @@ impl<const D: usize> Source<D> for Learned {
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
         network(descriptors).map(|_| ())
-    }
-
-    fn reads_descriptors_alone(&self) -> bool {
-        true
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {

@@ -7,7 +7,7 @@ use std::collections::btree_map::Entry;
 use super::plan::{NeighborsBy, Variant};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
-use crate::neighbors::{KeptLists, KeptPairs, Neighborhoods, Source, of_what_there_is};
+use crate::neighbors::{KeptLists, KeptPairs, Needs, Neighborhoods, Source, of_what_there_is};
 use crate::released::Released;
 use crate::truth::Secret;
 use crate::{About, Error, RowOrder};
@@ -47,7 +47,7 @@ impl Kept {
         seed: u64,
     ) -> Result<Neighborhoods, Error> {
         let k = source.k(released);
-        if !source.reads_descriptors_alone() {
+        if source.needs() != Needs::DescriptorsAlone {
             return source.lists(released, k, seed);
         }
         let mut kept = self.0.borrow_mut();

@@ -216,7 +216,7 @@ impl<const D: usize> Plan<D> {
 
     /// Returns an error if a source needs descriptors, for use where there are none.
     pub(super) fn without_descriptors(&self) -> Result<(), Error> {
-        let needy = self.own_sources().find(|source| source.needs() == Needs::Descriptors);
+        let needy = self.own_sources().find(|source| source.needs() != Needs::Nothing);
         needy.map_or(Ok(()), |source| Err(lacks_descriptors(source.name())))
     }
 

@@ -234,7 +234,7 @@ impl Source<3> for ByFamily {
     }
 
     fn needs(&self) -> Needs {
-        Needs::Descriptors
+        Needs::DescriptorsAlone
     }
 
     fn k(&self, released: &Released<3>) -> usize {
@@ -243,10 +243,6 @@ impl Source<3> for ByFamily {
 
     fn lists(&self, released: &Released<3>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
         Similarity.lists(released, k, seed)
-    }
-
-    fn reads_descriptors_alone(&self) -> bool {
-        true
     }
 }
 

@@ -114,7 +114,7 @@ fn similarity_is_the_cosine() {
 /// Returns all sources that compare descriptors. Sources from records alone are tested in `alone`.
 fn sources() -> impl Iterator<Item = Arc<dyn Source<3>>> {
     let sources = SOURCES.iter().map(|entry| source::<3>(entry.name));
-    sources.filter(|source| source.needs() == Needs::Descriptors)
+    sources.filter(|source| source.needs() != Needs::Nothing)
 }
 
 #[test]

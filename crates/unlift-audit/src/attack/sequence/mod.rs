@@ -287,27 +287,15 @@ struct Attack<'a> {
     seed: u64,
 }
 
-/// A number of keypoints or links, and how many of them are right.
-#[derive(Clone, Copy, Default)]
-struct Share {
-    n: usize,
-    right: usize,
+/// Whether each of these is right: keypoints, within the headline threshold, that are linked in three or more views, linked so by the
+/// model's tracks, and without a point of the service's map; then links of which the model knows both keypoints.
+type Outcomes = [Vec<bool>; 4];
+
+/// Returns the percentage that is right; `None` of nothing.
+fn percent(outcomes: &[bool]) -> Option<f64> {
+    let n_right = outcomes.iter().filter(|&&is_right| is_right).count();
+    (!outcomes.is_empty()).then(|| 100.0 * n_right as f64 / outcomes.len() as f64)
 }
-
-impl Share {
-    fn count(&mut self, is_right: bool) {
-        self.n += 1;
-        self.right += usize::from(is_right);
-    }
-
-    fn percent(&self) -> Option<f64> {
-        (self.n > 0).then(|| 100.0 * self.right as f64 / self.n as f64)
-    }
-}
-
-/// Keypoints, right within the headline threshold: linked in three or more views, linked so by the model's tracks, and without a
-/// point of the service's map. Then links of which the model knows both keypoints.
-type Shares = [Share; 4];
 
 const NAMES: [&str; 3] = ["linked", "tracked", "new"];
 
@@ -342,24 +330,22 @@ impl Protected<'_> {
         let queries = (0..self.views.len()).into_par_iter().with_max_len(1);
         let solved = queries.map(of_query).collect::<Result<Vec<_>, unlift::Error>>()?;
         let mut pooled = Pooled::new(&plan.thresholds);
-        let mut all = Shares::default();
-        for (query, (recovered, shares)) in solved.iter().enumerate() {
+        let mut all = Outcomes::default();
+        for (query, (recovered, outcomes)) in solved.iter().enumerate() {
             let (original, released) = (&self.views[query].original, &self.queries[query].released);
             pooled.add(recovered, original, &self.secrets[query], Some(released))?;
-            for (all, share) in all.iter_mut().zip(shares) {
-                *all = Share { n: all.n + share.n, right: all.right + share.right };
-            }
+            all.iter_mut().zip(outcomes).for_each(|(all, of)| all.extend(of));
         }
         let missing = || unlift::Error::new("sequence", "keypoints", "none");
         let mut row = pooled.row().ok_or_else(missing)?;
-        let of_all = |share: &Share| 100.0 * share.n as f64 / row.n_points.max(1) as f64;
         let label = &plan.thresholds[plan.headline].label;
-        for (name, share) in NAMES.into_iter().zip(&all) {
-            row.metrics.insert(format!("{name}_percent"), of_all(share));
-            let within = share.percent().map(|of| (format!("{name}_within_{label}_percent"), of));
+        for (name, of) in NAMES.into_iter().zip(&all) {
+            let of_all = 100.0 * of.len() as f64 / row.n_points.max(1) as f64;
+            row.metrics.insert(format!("{name}_percent"), of_all);
+            let within = percent(of).map(|share| (format!("{name}_within_{label}_percent"), share));
             row.metrics.extend(within);
         }
-        row.inlier_ratio = all[3].percent().unwrap_or(0.0) / 100.0;
+        row.inlier_ratio = percent(&all[3]).unwrap_or(0.0) / 100.0;
         Ok(row)
     }
 
@@ -383,12 +369,12 @@ impl Protected<'_> {
         tracks: &Links,
         query: usize,
         headline: f64,
-    ) -> Result<(Recovered<2>, Shares), unlift::Error> {
+    ) -> Result<(Recovered<2>, Outcomes), unlift::Error> {
         let window = self.window(query, attack.n);
         let solved = self.solve(attack, query)?;
         let original = &self.views[query].original;
         let accuracy = evaluate(&solved.recovered, original, &self.secrets[query])?;
-        let mut shares = Shares::default();
+        let mut outcomes = Outcomes::default();
         for (slot, &error) in accuracy.errors().iter().enumerate() {
             let is_within = error <= headline;
             let point = self.point(query, slot);
@@ -397,17 +383,17 @@ impl Protected<'_> {
                 1 + tracks.track(query, slot, &window).len() >= LEAST_VIEWS,
                 point.is_none(),
             ];
-            for (share, _) in shares.iter_mut().zip(counts).filter(|(_, is)| *is) {
-                share.count(is_within);
+            for (of, _) in outcomes.iter_mut().zip(counts).filter(|(_, is)| *is) {
+                of.push(is_within);
             }
             let Some(point) = point else { continue };
             for (other, at) in attack.links.track(query, slot, &window) {
                 if let Some(other) = self.point(other as usize, at as usize) {
-                    shares[3].count(point == other);
+                    outcomes[3].push(point == other);
                 }
             }
         }
-        Ok((solved.recovered, shares))
+        Ok((solved.recovered, outcomes))
     }
 
     /// Returns the `n` consecutive queries around `query`.
