@@ -9,11 +9,10 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use unlift::Unit;
 use unlift::geometry::camera::Camera;
-use unlift::localization::{Match, OnLine};
+use unlift::localization::{Match, OnLine, Problem};
 use unlift::obfuscate::{SchemeOptions, scheme};
 use unlift::seed::Key;
-use unlift_audit::localization::held_out::{Held, Problem};
-use unlift_audit::{Error, Preparation, Quiet, maps};
+use unlift_audit::{Error, Preparation, Quiet, localization, maps};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -23,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
     let prepared = maps::open(&model, None, &preparation)?;
     let cameras = &prepared.cameras;
-    let mut held = Held::open(&features, nth, cameras, &prepared.original, &Quiet)?;
+    let mut held = localization::open(&features, nth, cameras, &prepared.original, &Quiet)?;
     let lines = scheme("lines2d")?.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
     let lines = lines.ok_or_else(|| Error::failed("expected lines2d in 2D"))?;
     let queries = held.with_queries(&*lines, &Key::from_seed(0))?;

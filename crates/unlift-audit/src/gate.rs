@@ -4,19 +4,19 @@
 //! SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT
 //! ```
 //!
-//! `ppl@0.5:0.10<=20` fails if more than 20 % of the points are recovered within 0.10 under `ppl`
-//! at inlier ratio 0.5. `SCHEME` may be `all`. Without `@RATIO`, a solver or a source, all of them
-//! count. Every noise model and K counts. The upper end of the 95 % interval of the strongest attack decides. Attacks that need no
-//! neighborhoods (the blind guess and records alone) count as well, unless a solver or the oracle is named.
-//! `:gain` bounds what neighborhoods add to the larger of these two baselines, in percentage
-//! points. `SCHEME:localization<=MULTIPLE` fails if the error of localization exceeds the
-//! unprotected one by more than this factor. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a
-//! solver or a source is a number, so the first number after the scheme is the threshold.
-//! `sequence@5`, `sequence+lists@5` and `tracks@5` are sources: `dcl2d:sequence@5:10<=20` bounds what comes back from
-//! five queries, `olc:again:0.10<=20` what comes back from two releases of a map.
+//! `ppl@0.5:0.10<=20` fails if more than 20 % of the points are recovered within 0.10 under `ppl` at inlier ratio 0.5. `SCHEME` may
+//! be `all`. Without `@RATIO`, a solver or a source, all of them count. Every noise model and K counts. The upper end of the 95 %
+//! interval of the strongest attack decides. Attacks that need no neighborhoods (the blind guess and records alone) count as well,
+//! unless a solver or the oracle is named. `:gain` bounds what neighborhoods add to the larger of these two baselines, in
+//! percentage points. `SCHEME:localization<=MULTIPLE` fails if the error of localization exceeds the unprotected one by more than
+//! this factor. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a solver or a source is a number,
+//! so the first number after the scheme is the threshold. `sequence@5`, `sequence+lists@5` and `tracks@5` are sources:
+//! `dcl2d:sequence@5:10<=20` bounds what comes back from five queries, `olc:again:0.10<=20` what comes back from two releases of a
+//! map.
 
 use std::str::FromStr;
 
+use unlift::audit::doubts::{noise, short};
 use unlift::audit::{NotAudited, Row, WithInterval};
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Builtin;
@@ -25,7 +25,7 @@ use unlift_report::attack::{AGAIN, AGAIN_GEOMETRY, SEQUENCES, queries};
 use unlift_report::document::{FEWEST_HELD_OUT, GateResult, HeldOut, Localization, UNPROTECTED};
 
 use crate::document::{Attacked, Tried};
-use crate::doubts::{HOPELESS, nearest, noise, short};
+use crate::doubts::{HOPELESS, nearest};
 use crate::{Error, bail, sources};
 
 /// A bound on a figure of an audit.
@@ -67,8 +67,7 @@ impl Gate {
             && self.inlier_ratio.is_none_or(is_requested)
     }
 
-    /// Returns true if the gate applies to something without a row. If a scheme could not be
-    /// applied, every gate on it does.
+    /// Returns true if the gate applies to something without a row. If a scheme could not be applied, every gate on it does.
     fn misses(&self, missing: &NotAudited) -> bool {
         let of_source = |name: &String| self.source.as_ref().is_none_or(|wanted| wanted == name);
         let of_ratio = self.inlier_ratio.is_none_or(|wanted| missing.inlier_ratio == Some(wanted));

@@ -49,7 +49,7 @@ pub mod sources;
 pub use attack::{Again, Hidden, Images, Input, Map, Maps, Sequence, Tiles};
 pub use audit::{Audit, Audited, FIGURES, Files, Finished, Output, PAGE, check_file, refused};
 pub use document::evaluated;
-pub use doubts::{Checked, check_scale, check_thresholds, unlike_neighbors};
+pub use doubts::{check_scale, check_thresholds};
 pub use gate::{Gate, number, positive, ratio};
 pub use maps::released;
 pub use maps::{Preparation, Prepared, by_point, prepare};
@@ -126,8 +126,7 @@ pub trait Progress: Send + Sync {
     /// Passes a note to the user.
     fn say(&self, _line: &str) {}
 
-    /// Returns whether the work continues. The audit calls it between cells; on false, it ends with
-    /// an error and writes nothing.
+    /// Returns whether the work continues. The audit calls it between cells; on false, it ends with an error and writes nothing.
     fn goes_on(&self) -> bool {
         true
     }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use unlift::audit::doubts::Checked;
 use unlift::audit::{Plan, measure};
 use unlift::evaluate::blind;
 use unlift::recover::{Builtin, RecoverOptions, Recovered as Found, recover as solve};
-use unlift_audit::Checked;
 use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
 use crate::arrays::{raised, to_array, to_rows};
@@ -31,8 +31,7 @@ impl Recovered {
         Ok(Self(Arc::new(recovered)))
     }
 
-    /// Writes the points (`.npz`), as `unlift recover` does. Replaces other files only with
-    /// `force`.
+    /// Writes the points (`.npz`), as `unlift recover` does. Replaces other files only with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         save(py, (path, force), Kind::Recovered, |path| write_recovered(path, &self.0))
@@ -97,9 +96,8 @@ impl Recovered {
     }
 }
 
-/// Recovers the points of a released map from neighbor lists, without the truth. `solver` is a name
-/// in `SOLVERS` or a function; default: "joint". `confidence=False` skips the computation of
-/// `probability_within`.
+/// Recovers the points of a released map from neighbor lists, without the truth. `solver` is a name in `SOLVERS` or a function;
+/// default: "joint". `confidence=False` skips the computation of `probability_within`.
 #[pyfunction]
 #[pyo3(signature = (released, lists, *, solver=None, delta=None, seed=0, confidence=true, threads=None))]
 #[allow(clippy::too_many_arguments)]
@@ -126,8 +124,7 @@ pub fn recover(
     Ok(Recovered(Arc::new(recovered.map_err(|error| by.as_cause_of(py, error))?)))
 }
 
-/// Compares recovered points with the truth; returns a dict like a row of an audit. With a Hidden
-/// it includes the blind baseline.
+/// Compares recovered points with the truth; returns a dict like a row of an audit. With a Hidden it includes the blind baseline.
 #[pyfunction]
 #[pyo3(signature = (recovered, truth, *, thresholds=None))]
 pub fn evaluate<'py>(

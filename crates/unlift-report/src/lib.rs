@@ -28,7 +28,6 @@ pub use attack::{ByAttack, same_lists};
 pub use document::{Document, Error, rounded};
 pub use export::text_table;
 pub use gates::{gate_lines, junit};
-pub use page::curves::ErrorCdf;
 pub use page::scene::Scene3d;
 pub use page::{Opening, RenderOptions, Shares, inversions, pictures, render, scene, shares};
 pub use release::leak;

@@ -113,6 +113,14 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.search(position, None, k, found);
     }
 
+    /// Returns the row nearest to a position if it is within `radius`, the first of equal ones, and its squared distance.
+    pub fn nearest_within(&self, position: [f64; D], radius: f64) -> Option<(f64, usize)> {
+        let mut nearest = Vec::new();
+        self.nearest_to(position, 1, &mut nearest);
+        let &(distance2, row) = nearest.first()?;
+        (distance2 <= radius * radius).then_some((distance2, row as usize))
+    }
+
     /// Returns `of(row, its k(row) nearest other rows)` for every row. The nearest are (squared distance, row), nearest first.
     pub fn per_row<T: Send>(
         &self,

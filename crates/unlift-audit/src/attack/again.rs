@@ -11,6 +11,8 @@ use std::sync::Arc;
 use serde_json::json;
 use unlift::Unit;
 use unlift::again::{Solved, by_descriptors, by_geometry};
+use unlift::audit::frames::doubt_of_frames;
+use unlift::audit::published::nearest_to;
 use unlift::audit::{NotAudited, Plan, Row, measure, records_alone};
 use unlift::evaluate::{blind, joined};
 use unlift::geometry::knn::Knn;
@@ -24,11 +26,10 @@ use unlift_report::Document;
 use unlift_report::attack::{AGAIN, AGAIN_GEOMETRY};
 use unlift_report::document::Input;
 
-use super::frames::doubt_of_frames;
 use super::names;
 use crate::audit::{Audit, Audited};
 use crate::document::{Attacked, Tried};
-use crate::doubts::{nearest_to, with_sides};
+use crate::doubts::with_sides;
 use crate::maps::{self, Preparation, Prepared};
 use crate::{Error, Progress, bail, check_stop};
 
@@ -118,7 +119,10 @@ impl Again<'_> {
             lacks_best_source: described,
             ..Tried::by(&self.plan, described)
         };
-        let frame = self.maps.second.as_ref().map(|second| doubt_of_frames(first, second));
+        let frame = self.maps.second.as_ref().map(|second| {
+            let own = (&*first.original, first.descriptors.as_ref());
+            doubt_of_frames(own, (&second.original, second.descriptors.as_ref()))
+        });
         let frame = frame.transpose()?.flatten();
         let doubts: Vec<String> = audit.doubts.iter().cloned().chain(frame).collect();
         let without = "links by geometry only: both maps need descriptors for others";
@@ -198,8 +202,7 @@ fn name([a, b]: &[Arc<dyn Scheme<3>>; 2]) -> String {
     if a.name() == b.name() { a.name().to_owned() } else { format!("{}/{}", a.name(), b.name()) }
 }
 
-/// Measures what came back of the first map. A link is right if no point of the second map is nearer
-/// to the first one's.
+/// Measures what came back of the first map. A link is right if no point of the second map is nearer to the first one's.
 fn row(
     solved: &Solved,
     plan: &Plan<3>,

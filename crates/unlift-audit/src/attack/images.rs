@@ -12,7 +12,7 @@ use unlift_report::pictures::Picture;
 use unlift_report::{Document, RenderOptions};
 
 use super::album::Album;
-use super::curves::OfItems;
+use super::items::OfItems;
 use crate::audit::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
 use crate::images::Opened;
@@ -42,18 +42,17 @@ impl Images<'_> {
         audit.begin(&Tried::by(plan, false), None, [], progress)?;
         let tally = RefCell::new(Tally::default());
         let mut images = Vec::new();
-        let mut watcher = OfItems::new(plan, progress, |name, rows| {
+        let each = |name: &str, rows: &[Row]| {
             images.push(figures(name, tally.borrow().sizes[images.len()], rows));
-        });
+        };
         progress.show(0, chosen.len(), "reading images");
         source.refused.iter().for_each(|line| progress.say(line));
         tally.borrow_mut().unusable += source.refused.len();
         let read = stream((source, path), chosen, Some(plan), &tally, progress);
-        let outcome = run_many(read, plan, &mut watcher)?;
+        let outcome = run_many(read, plan, &mut OfItems { steps: progress, each })?;
         for error in self.inversion.iter().flat_map(|inversion| inversion.failed()) {
             progress.say(&format!("note: not painted: {error}"));
         }
-        let error_cdf = watcher.curves.of_rows(&outcome.rows);
         let tally = tally.into_inner();
         if tally.used.is_empty() {
             let expected = format!("{} images that can be used", tally.unusable);
@@ -90,7 +89,7 @@ impl Images<'_> {
             },
             not_audited: outcome.not_audited,
             seconds: outcome.seconds,
-            rendering: RenderOptions { error_cdf, pictures, inversions, ..Default::default() },
+            rendering: RenderOptions { pictures, inversions, ..Default::default() },
         };
         audit.finish(plan, attacked)
     }

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use unlift::audit::doubts::{NeighborDistances, check_truth};
+use unlift::audit::published::{follows_places, read_from_file};
 use unlift::audit::{Alone, Cell, Observer, Plan, Row, run, run_many, run_released};
 use unlift::geometry::frame::rounded_origin;
 use unlift::released::Released;
@@ -10,13 +12,13 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::{ObfuscationView, SceneBox, points_within_budget, subsample};
 use unlift_report::{ByAttack, Document, RenderOptions, Scene3d};
 
-use super::curves::{Curves, OfItems};
+use super::items::OfItems;
 use super::tiles::{Tiles, figures};
 use crate::audit::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
-use crate::doubts::{Spread, check_truth, doubts, follows_places, read_from_file, with_sides};
+use crate::doubts::{doubts, with_sides};
 use crate::inversion::MapInversion;
-use crate::localization::{self, Localize};
+use crate::localization::{Localize, localization};
 use crate::maps::released::slot_of;
 use crate::maps::shapes::{near, shapes};
 use crate::maps::{Prepared, USUAL_K};
@@ -78,28 +80,28 @@ impl Map<'_> {
         };
         // Localization comes first: wrong features are reported before the long attacks.
         let (localization, notes_on_images) = match localize {
-            Some(localize) => localization::of_schemes(localize, prepared, plan, progress)?,
+            Some(localize) => localization(localize, prepared, plan, progress)?,
             None => Default::default(),
         };
         let cut = tiles.map(|tiles| tiles.of(points.positions(), prepared.input.up)).transpose()?;
-        let spread = match &cut {
-            Some(tiles) => Spread::of(tiles.iter().map(|tile| tile.points(points)), plan.k),
-            None => Spread::of(std::iter::once(Ok(points)), plan.k),
+        let usual = match &cut {
+            Some(tiles) => {
+                NeighborDistances::of(tiles.iter().map(|tile| tile.points(points)), plan.k)
+            }
+            None => NeighborDistances::of(std::iter::once(Ok(points)), plan.k),
         };
-        let spread = spread.map_err(of_file)?;
+        let usual = usual.map_err(of_file)?;
         if let Some(release) = release {
-            check_truth(original, release, &spread).map_err(of_file)?;
+            check_truth(original, release, &usual).map_err(of_file)?;
         }
         let (mut scene, mut inversions, mut tile_rows) = (None, Vec::new(), Vec::new());
-        let (mut outcome, curves) = match &cut {
+        let mut outcome = match &cut {
             Some(tiles) => {
-                let mut watcher =
-                    OfItems::new(plan, progress, |_, rows| tile_rows.push(rows.to_vec()));
+                let each = |_: &str, rows: &[Row]| tile_rows.push(rows.to_vec());
                 progress.show(0, tiles.len(), "splitting the map into tiles");
                 let items = tiles.iter().map(|tile| tile.item(original, descriptors));
-                let outcome = run_many(items, plan, &mut watcher)
-                    .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
-                (outcome, watcher.curves)
+                run_many(items, plan, &mut OfItems { steps: progress, each })
+                    .map_err(|error| of_file(error).advise("a larger --tile-points"))?
             }
             None => {
                 let inversion = self.inversion.clone();
@@ -108,7 +110,6 @@ impl Map<'_> {
                 let mut watcher = Watcher {
                     progress,
                     pictures: draws.then(|| Pictures::new(prepared, plan)),
-                    curves: Curves::new(plan, progress),
                     inversion,
                     sheets: vec![Sheet::default(); if draws { n_sheets } else { 0 }],
                     failed: None,
@@ -127,7 +128,7 @@ impl Map<'_> {
                 }
                 scene = watcher.pictures.map(|pictures| pictures.scene);
                 inversions = watcher.sheets;
-                (outcome, watcher.curves)
+                outcome
             }
         };
         // Of values that are no better than a blind guess there is nothing to say.
@@ -144,7 +145,7 @@ impl Map<'_> {
         let mut of_points = audit.doubts.clone();
         of_points.extend(release.iter().flat_map(|release| follows_places(original, release)));
         let rows = (plan, &outcome.rows[..], &tile_rows[..]);
-        let doubts = doubts((original, spread), release, rows, &of_points);
+        let doubts = doubts((original, usual), release, rows, &of_points);
         for note in doubts.notes.iter().filter(|note| !audit.doubts.contains(note)) {
             progress.say(&format!("note: {note}"));
         }
@@ -154,7 +155,6 @@ impl Map<'_> {
             options.insert("tile_points".into(), max_points.into());
             options.extend(only.map(|at| ("tile".to_owned(), at.into())));
         }
-        let error_cdf = curves.of_rows(&outcome.rows);
         let tiles = cut.iter().flat_map(|tiles| figures(tiles, &tile_rows, &outcome.rows));
         let document = Document {
             input: with_sides(audit.about.clone(), points),
@@ -173,7 +173,7 @@ impl Map<'_> {
             not_audited: outcome.not_audited,
             seconds: outcome.seconds,
             doubts: doubts.of_rows,
-            rendering: RenderOptions { scene, error_cdf, inversions, ..RenderOptions::default() },
+            rendering: RenderOptions { scene, inversions, ..RenderOptions::default() },
         };
         audit.finish(plan, attacked)
     }
@@ -182,7 +182,6 @@ impl Map<'_> {
 struct Watcher<'a> {
     progress: &'a dyn Progress,
     pictures: Option<Pictures>,
-    curves: Curves<'a>,
     inversion: Option<Arc<MapInversion>>,
     /// One sheet for each of the first cameras.
     sheets: Vec<Sheet>,
@@ -202,7 +201,6 @@ impl Observer for Watcher<'_> {
         if cell.repeat > 0 {
             return;
         }
-        self.curves.cell(cell);
         if let Some(pictures) = &mut self.pictures {
             pictures.add(cell);
         }

@@ -2,9 +2,8 @@
 
 mod again;
 mod album;
-mod curves;
-mod frames;
 mod images;
+mod items;
 mod map;
 mod sequence;
 mod tiles;

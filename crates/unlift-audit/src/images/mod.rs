@@ -1,7 +1,6 @@
 //! Features of images from a folder of photos, an HDF5 file of hloc, a COLMAP database, or memory.
 
 mod folder;
-pub(crate) mod keypoints;
 pub mod stream;
 
 use std::num::NonZeroUsize;
@@ -20,8 +19,6 @@ use unlift_vision::network::DescriptorKind;
 
 use crate::request::check_fit;
 use crate::{Error, bail, sources};
-
-pub use folder::is_photo;
 
 type Get = Box<dyn Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync>;
 
@@ -72,8 +69,7 @@ impl FeatureSource {
     /// thread. An audit requests a few at a time, and the drawn ones again.
     ///
     /// # Errors
-    /// If `names` is empty, or not sorted by bytes without repetition: the order decides the last
-    /// bits of sums.
+    /// If `names` is empty, or not sorted by bytes without repetition: the order decides the last bits of sums.
     pub fn in_memory(
         names: Vec<String>,
         get: impl Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync + 'static,
@@ -156,6 +152,13 @@ pub fn kind_of(option: &str, descriptors: Option<&Descriptors>) -> Result<Descri
         bail!("{option}: expected descriptors, found none");
     };
     DescriptorKind::of(descriptors, option).map_err(|error| Error::request(error.to_string()))
+}
+
+/// Returns what was expected and found if the size of an image is known, and is not that of its camera.
+pub(crate) fn other_size(found: Option<[u32; 2]>, camera: [f64; 2]) -> Option<(String, String)> {
+    let [width, height] = found?.map(f64::from);
+    let expected = format!("{} x {} pixels, as its camera in the model", camera[0], camera[1]);
+    ([width, height] != camera).then(|| (expected, format!("{width} x {height}")))
 }
 
 /// What a user requests of the extraction from photos; `None` is the default.

@@ -8,14 +8,14 @@ use unlift::{Descriptors, Error};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::network::DescriptorKind;
-use unlift_vision::pictures::{Gallery, Points};
+use unlift_vision::pictures::{Gallery, Painter, Picture, Points, Reference, needed, size};
 
 use crate::images::{FeatureSource, evenly};
 
-use super::{Painter, Photo, Picture, lock, needed, size};
+use super::{add_to, lock};
 
 /// A photo and the picture of its true points: no attack on positions can be expected to do better.
-type Truth = (Photo, Picture);
+type Truth = (Reference, Picture);
 
 /// Number of photos kept for further cells; fewer images are processed at the same time.
 const KEPT: usize = 64;
@@ -70,7 +70,7 @@ impl Inversion {
     pub fn add(&self, cell: &Cell<'_, 2>, sheet: &mut Sheet) -> Result<(), Error> {
         let image = self.painter.image(cell.released, cell.recovered)?;
         let (photo, baseline) = &*self.truth(cell)?;
-        self.painter.compare(image, photo, None)?.add_to(sheet, (photo, baseline), cell.row)
+        add_to(sheet, (photo, baseline), &self.painter.compare(image, photo, None)?, cell.row)
     }
 
     /// Adds the picture of `recovered` keypoints to the sheet of the image `name`, whose photo has
@@ -85,7 +85,7 @@ impl Inversion {
     ) -> Result<(), Error> {
         let (photo, baseline) = &*self.truth_of(name, size, original)?;
         let image = self.painter.inverter.invert(recovered, size)?;
-        self.painter.compare(image, photo, None)?.add_to(sheet, (photo, baseline), row)
+        add_to(sheet, (photo, baseline), &self.painter.compare(image, photo, None)?, row)
     }
 
     fn truth(&self, cell: &Cell<'_, 2>) -> Result<Arc<Truth>, Error> {
@@ -113,7 +113,7 @@ impl Inversion {
             let path = path.display().to_string().escape_debug().to_string();
             return Err(Error::new(path, format!("a photo of {expected}"), found));
         }
-        let photo = self.painter.photo(name, &photo)?;
+        let photo = self.painter.reference(name, &photo)?;
         let image = self.painter.keypoints(places, descriptors, size)?;
         let baseline = self.painter.compare(image, &photo, Some(&self.gallery))?;
         let truth = Arc::new((photo, baseline));
@@ -131,8 +131,7 @@ impl Measure<2> for Inversion {
         true
     }
 
-    /// Returns no figures if the photo cannot be used; [`failed`](Inversion::failed) has the
-    /// reason. Other images continue.
+    /// Returns no figures if the photo cannot be used; [`failed`](Inversion::failed) has the reason. Other images continue.
     fn measure(&self, cell: &Cell<'_, 2>) -> Result<Vec<(String, f64)>, Error> {
         let name = cell.name.unwrap_or_default();
         let truth = match self.truth(cell) {

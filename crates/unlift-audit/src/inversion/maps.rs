@@ -14,9 +14,9 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::pictures::{Marks, ReleasedView};
 use unlift_report::scene::{SceneBox, Shapes};
 use unlift_vision::features::photo::{Turn, read_color};
-use unlift_vision::pictures::{Gallery, Lens, View};
+use unlift_vision::pictures::{Gallery, Lens, Painter, Picture, Reference, View, needed};
 
-use super::{Painter, Photo, Picture, lock, needed};
+use super::{add_to, lock};
 use crate::Progress;
 use crate::images::{evenly, kind_of};
 use crate::maps::Prepared;
@@ -28,7 +28,7 @@ const LEAST_SIDE: usize = 16;
 #[derive(Debug)]
 struct PhotoView {
     view: View,
-    photo: Photo,
+    photo: Reference,
     /// The picture of the true points.
     truth: OnceLock<Result<Picture, Error>>,
 }
@@ -42,8 +42,7 @@ pub struct MapInversion {
     gallery: Gallery,
     /// The inlier ratio of the oracle whose recoveries are painted; `None`: all.
     ratio: Option<f64>,
-    /// The cell that was measured last and its pictures, one per photo, so that the page does not
-    /// paint them again.
+    /// The cell that was measured last and its pictures, one per photo, so that the page does not paint them again.
     last: Mutex<Option<(Row, u32, Vec<Picture>)>>,
 }
 
@@ -142,7 +141,7 @@ impl MapInversion {
                 let marks = marks(&of.view, shapes, middle)?;
                 sheet.released.push(ReleasedView { scheme: cell.row.scheme.clone(), marks });
             }
-            picture.add_to(sheet, (&of.photo, self.truth(of, cell)?), cell.row)?;
+            add_to(sheet, (&of.photo, self.truth(of, cell)?), &picture, cell.row)?;
         }
         Ok(())
     }
@@ -253,13 +252,12 @@ fn open_photo(
             return Err(Error::new("size", expected, format!("{width} x {height} pixels")));
         }
         let name = String::from_utf8_lossy(&image.name);
-        Ok(PhotoView { view, photo: painter.photo(&name, &photo)?, truth: OnceLock::new() })
+        Ok(PhotoView { view, photo: painter.reference(&name, &photo)?, truth: OnceLock::new() })
     };
     open().map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
 }
 
-/// Returns the view of an image of a COLMAP model; `scale` is the number of units per unit of the
-/// model.
+/// Returns the view of an image of a COLMAP model; `scale` is the number of units per unit of the model.
 pub fn view(camera: &colmap::Camera, image: &colmap::Image, scale: f64) -> Result<View, Error> {
     Ok(View {
         pose: Pose { center: image.pose.center.map(|x| x * scale), ..image.pose },

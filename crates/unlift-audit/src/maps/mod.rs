@@ -1,6 +1,5 @@
 //! Maps: read from files, and their points selected and scaled for an audit.
 
-mod cameras;
 pub mod released;
 pub(crate) mod shapes;
 
@@ -9,25 +8,24 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use unlift::audit::PointNeighbors;
+use unlift::audit::doubts::unlike_neighbors;
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::{distance, median};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
 use unlift_io::hash::{hash_file, hash_files};
-use unlift_io::read;
+use unlift_io::read::{self, Cameras};
 use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
-pub use self::cameras::Cameras;
 use crate::bail;
-use crate::doubts::{check_scale, unlike_neighbors, with_sides};
+use crate::doubts::{check_scale, with_sides};
 
 /// Options for the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preparation {
-    /// Meters per unit of the file. Without it, the median distance to the K-th neighbor is the
-    /// unit.
+    /// Meters per unit of the file. Without it, the median distance to the K-th neighbor is the unit.
     pub scale: Option<f64>,
     /// The K of that unit.
     pub k: usize,
@@ -129,8 +127,7 @@ impl Prepared {
 /// input.
 ///
 /// # Errors
-/// If a file cannot be read, if the scale makes lengths meaningless, or if too few points are
-/// left.
+/// If a file cannot be read, if the scale makes lengths meaningless, or if too few points are left.
 pub fn open(
     path: &Path,
     descriptors: Option<&Path>,
@@ -185,8 +182,7 @@ pub fn open(
     Ok(prepared)
 }
 
-/// Reads the first file beside the model of `input` that has the descriptors of its points; returns why none of
-/// them has.
+/// Reads the first file beside the model of `input` that has the descriptors of its points; returns why none of them has.
 fn beside(input: &read::Input) -> Result<(Descriptors, PathBuf), Vec<String>> {
     let mut reasons = Vec::new();
     let read = |file: &PathBuf| {
@@ -211,8 +207,7 @@ fn rows_of_file(rows: &[u32], left_out: &[u64]) -> Vec<u32> {
     rows.iter().map(of_file).collect()
 }
 
-/// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like
-/// this.
+/// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like this.
 pub fn zeros(descriptors: &Descriptors) -> Option<String> {
     let is_zero = |row: &Vec<f32>| row.iter().all(|&value| value == 0.0);
     let (n, of) = (descriptors.rows().filter(is_zero).count(), descriptors.len());
@@ -306,8 +301,7 @@ pub fn by_point(path: &Path, prepared: &mut Prepared) -> Result<PointNeighbors, 
     Ok(PointNeighbors { name, offsets, neighbors, scores })
 }
 
-/// Returns notes and doubts about given lists. With lists of another map little is recovered, which
-/// would look like protection.
+/// Returns notes and doubts about given lists. With lists of another map little is recovered, which would look like protection.
 fn doubts(
     offsets: &[u64],
     neighbors: &[u32],

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use unlift::Fingerprint;
+use unlift::audit::doubts::unlike_neighbors;
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_io::Error as FileError;
@@ -12,7 +13,6 @@ use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
 use super::{Prepared, zeros};
-use crate::doubts::unlike_neighbors;
 use crate::{Error, bail};
 
 /// A released map, its secret, and the original points.
@@ -141,8 +141,7 @@ pub fn check_name(text: &str) -> Result<String, String> {
     Err(format!("expected {NAME}, found {text}"))
 }
 
-/// Returns an error if `file` belongs to another released map than `of`. A missing fingerprint is
-/// accepted.
+/// Returns an error if `file` belongs to another released map than `of`. A missing fingerprint is accepted.
 pub fn same_map(
     file: &Path,
     found: Option<Fingerprint>,
@@ -158,8 +157,7 @@ pub fn same_map(
     }
 }
 
-/// Returns an error if the released map and the truth differ in the number of hidden points, in
-/// total or per record.
+/// Returns an error if the released map and the truth differ in the number of hidden points, in total or per record.
 pub fn expect_slots<const D: usize>(
     path: &Path,
     released: &Released<D>,

@@ -1,9 +1,9 @@
-//! Audits whose gates would hold without doubts, because the attack was weak or the ground truth
-//! was of another map.
+//! Audits whose gates would hold without doubts, because the attack was weak or the ground truth was of another map.
 
 use std::path::Path;
 use std::sync::Arc;
 
+use unlift::audit::doubts::unlike_neighbors;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::descriptors::Values;
 use unlift::neighbors::Geometric;
@@ -13,9 +13,7 @@ use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_audit::{
-    Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare, unlike_neighbors,
-};
+use unlift_audit::{Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare};
 use unlift_io::read;
 
 use crate::{audited, schemes};
@@ -130,8 +128,7 @@ fn a_gate_that_no_attack_could_break_is_refused() {
     assert!(error.starts_with("--gate olc:1e-6<=1: expected points less"), "{error}");
 }
 
-/// Ground truth of a map that was scaled later: its points are nearer to their own records than to
-/// others, but not near.
+/// Ground truth of a map that was scaled later: its points are nearer to their own records than to others, but not near.
 #[test]
 fn a_truth_in_another_scale_is_no_protection() {
     let audit = |factor: f64| {

@@ -8,14 +8,13 @@ use unlift::Unit;
 use unlift::audit::Plan;
 use unlift::descriptors::Values;
 use unlift::geometry::camera::{Camera, Intrinsics, Pose};
+use unlift::localization::Localization;
 use unlift::obfuscate::{Change, Changed, Mitigation};
 use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
-use unlift_audit::localization::Localize;
-use unlift_audit::localization::held_out::Held;
+use unlift_audit::localization::{self, Localize};
 use unlift_audit::{Audited, Input, Map, Preparation, Prepared, Quiet, maps};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
-use unlift_report::document::Localization;
 
 use crate::{audited, schemes};
 
@@ -30,8 +29,7 @@ fn camera(image: u32) -> Camera {
     Camera { intrinsics, pose: Pose { rotation, center } }
 }
 
-/// Writes a COLMAP model of random points, and features of its images with noise of half a pixel and
-/// similar descriptors.
+/// Writes a COLMAP model of random points, and features of its images with noise of half a pixel and similar descriptors.
 fn write(folder: &Path) {
     let mut draws = Draws::new(4, Stage::Shapes, 0);
     let mut point = |_| [draws.between(0.0, 5.0), draws.between(3.0, 5.0), draws.between(0.0, 2.5)];
@@ -164,7 +162,8 @@ fn photos_of_another_size_are_refused() {
     std::fs::write(folder.path().join("cameras.txt"), camera).unwrap();
     let Prepared { cameras, original, .. } = open(folder.path());
     let features = folder.path().join("features.h5");
-    let error = Held::open(&features, 4, &cameras, &original, &Quiet).err().unwrap().to_string();
+    let error =
+        localization::open(&features, 4, &cameras, &original, &Quiet).err().unwrap().to_string();
     let expected = "expected 1280 x 960 pixels, as its camera in the model, found 640 x 480";
     assert!(error.ends_with(expected), "{error}");
 }

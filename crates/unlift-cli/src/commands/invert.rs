@@ -9,7 +9,7 @@ use unlift::OneLine;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift_audit::images::{FeatureSource, Wanted, evenly, kind_of};
-use unlift_audit::inversion::{Painter, on_bearings, six_views, view};
+use unlift_audit::inversion::view;
 use unlift_audit::refused;
 use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, make_folders, write_file};
@@ -20,6 +20,7 @@ use unlift_io::stage::{
 };
 use unlift_vision::features::{ColorImage, photo};
 use unlift_vision::network::DescriptorKind;
+use unlift_vision::pictures::{Painter, on_bearings, six_views};
 
 use super::common::all_could_be;
 use super::stages::{self, of_image};
@@ -206,8 +207,7 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Painted> {
     }))
 }
 
-/// Paints six views from the center of bearings, such as a sphere cloud: directions are released, so
-/// nothing needs to be recovered.
+/// Paints six views from the center of bearings, such as a sphere cloud: directions are released, so nothing needs to be recovered.
 fn bearings(to: &Target<'_>, released: &Released<3>) -> crate::Result<Painted> {
     let of_map = |error| FileError::core(&to.args.path, error);
     let painter = Painter::open(kind_of("PATH", released.descriptors())?, None)?;

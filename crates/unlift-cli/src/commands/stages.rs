@@ -7,6 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use unlift::audit::doubts::Checked;
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::blind;
@@ -22,7 +23,7 @@ use unlift_audit::changes::{mitigations, protections_of_map};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Tally, stream};
 use unlift_audit::released::{expect_slots, same_map};
-use unlift_audit::{Checked, Prepared, Progress as _, bail, check_file, refused};
+use unlift_audit::{Prepared, Progress as _, bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::outputs::{Kind, OutputSet, Rules};

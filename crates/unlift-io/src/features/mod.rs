@@ -7,6 +7,7 @@
 pub(crate) mod database;
 mod hloc;
 mod links;
+mod photos;
 
 use std::path::{Path, PathBuf};
 
@@ -19,6 +20,7 @@ use crate::read::lines::quoted;
 
 pub use hloc::FeatureWriter;
 pub(crate) use hloc::is_ours;
+pub use photos::Photos;
 
 /// Features of one image, independent of the file format.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,8 +61,7 @@ impl ImageFeatures {
     }
 }
 
-/// Rounds descriptors of a network to half floats, as hloc stores them, so that memory and files
-/// have equal values.
+/// Rounds descriptors of a network to half floats, as hloc stores them, so that memory and files have equal values.
 pub fn round_to_half(values: &mut [f32]) {
     values.iter_mut().for_each(|value| *value = f16::from_f32(*value).to_f32());
 }

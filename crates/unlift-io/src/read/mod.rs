@@ -3,6 +3,7 @@
 pub(crate) mod archive;
 mod bundler;
 pub(crate) mod bytes;
+mod cameras;
 pub mod colmap;
 mod descriptors;
 mod json;
@@ -17,6 +18,7 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
+pub use cameras::Cameras;
 pub use descriptors::{Alike, descriptors};
 pub use map_input::Input;
 
@@ -26,10 +28,9 @@ use models::Model;
 
 /// Reads the map at `path`.
 ///
-/// `path` is a COLMAP model folder, a project folder that contains one (of several, the one with
-/// the most points), a map of OpenSfM, nerfstudio, Bundler or VisualSFM (NVM), or a point cloud;
-/// `EXPECTED` lists the extensions. Points whose coordinates are not finite are
-/// left out and counted.
+/// `path` is a COLMAP model folder, a project folder that contains one (of several, the one with the most points), a map of
+/// OpenSfM, nerfstudio, Bundler or VisualSFM (NVM), or a point cloud; `EXPECTED` lists the extensions. Points whose coordinates are
+/// not finite are left out and counted.
 ///
 /// # Errors
 /// When nothing readable is there, a file is malformed, or no point has finite coordinates.

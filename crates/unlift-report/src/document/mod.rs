@@ -1,8 +1,7 @@
 //! The structs of `audit.json`, schema 1.
 //!
-//! `results` has one [`Row`] per (scheme, neighbors, oracle noise, inlier ratio, K, solver). Only [`Run`]
-//! holds what differs between runs (seconds, memory, threads, command line), so `results` are
-//! byte-identical for the same input, options and seed.
+//! `results` has one [`Row`] per (scheme, neighbors, oracle noise, inlier ratio, K, solver). Only [`Run`] holds what differs
+//! between runs (seconds, memory, threads, command line), so `results` are byte-identical for the same input, options and seed.
 
 mod check;
 mod share;
@@ -14,6 +13,8 @@ pub use unlift::audit::{
     Bound, BreakEven, ByReason, ByThreshold, Distinct, Intervals, NotAudited, ReliabilityBin, Row,
     STRONGEST, Spread,
 };
+
+pub use unlift::localization::{FEWEST_HELD_OUT, HeldOut, Localization, UNPROTECTED};
 
 use crate::words;
 
@@ -104,82 +105,6 @@ impl Input {
     pub fn extent(&self) -> Option<String> {
         let scale = self.scale_m_per_unit.map(|scale| format!(" at --scale {scale}"));
         Some(self.size()? + &scale.unwrap_or_default())
-    }
-}
-
-/// The accuracy of localization under a scheme: medians over the images of the map.
-///
-/// These figures are an information bound: all true matches of an image, at the true pose, with
-/// noise of 1 px. Errors are standard deviations. A value is `None` if at least half of the images
-/// do not localize.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Localization {
-    /// The scheme's user-facing name; [`UNPROTECTED`] for the map without protection.
-    pub scheme: String,
-    /// Whether the scheme protects keypoints of queries; else it protects the map.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub of_queries: bool,
-    /// Error of the camera center, as a multiple of the unprotected one: the median over images.
-    pub multiple: Option<f64>,
-    /// Error of the camera center, in the unit of the rows.
-    pub center_error: Option<f64>,
-    /// Error of the rotation in degrees.
-    pub rotation_error_degrees: Option<f64>,
-    /// Percent of the images that do not localize.
-    pub failed_percent: f64,
-    /// Whether the scheme changes descriptors. The bound does not include matching, so it does not
-    /// tell what this costs.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub changes_descriptors: bool,
-    /// What was measured on images that were held out; `None` if it was not.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub held_out: Option<HeldOut>,
-}
-
-/// The accuracy of localization of images that the map was made without.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct HeldOut {
-    /// Number of held-out images.
-    pub n_images: u64,
-    /// Median number of matches within 3 px of the true projection.
-    pub right_matches: f64,
-    /// Median number of matches.
-    pub matches: f64,
-    /// Median error of the camera center, in the unit of the rows. `None` if at least half of the
-    /// images have no pose.
-    pub center_error: Option<f64>,
-    /// Median error of the rotation in degrees.
-    pub rotation_error_degrees: Option<f64>,
-    /// The median error of the center as a multiple of the unprotected one.
-    pub multiple: Option<f64>,
-    /// Percent of the images within limits of both errors, by limit: `5 cm, 5 deg`.
-    pub recall_percent: ByThreshold,
-}
-
-/// The value of [`Localization::scheme`] for the map without protection.
-pub const UNPROTECTED: &str = "none";
-
-/// The smallest number of held-out images whose median tells schemes apart.
-pub const FEWEST_HELD_OUT: u64 = 10;
-
-impl Localization {
-    /// Returns the figures of held-out images if there are at least [`FEWEST_HELD_OUT`] of them.
-    pub fn measured(&self) -> Option<&HeldOut> {
-        self.held_out.as_ref().filter(|found| found.n_images >= FEWEST_HELD_OUT)
-    }
-
-    /// Returns the error as a multiple of the unprotected one: as [measured](Self::measured), else by
-    /// the bound. `None` if cameras do not localize, or if the bound does not tell.
-    pub fn cost(&self) -> Option<f64> {
-        match self.measured() {
-            Some(found) => found.multiple,
-            None => self.multiple.filter(|_| !self.changes_descriptors),
-        }
-    }
-
-    /// Returns true if what localization costs under this scheme was not measured.
-    pub fn is_unknown(&self) -> bool {
-        self.measured().is_none() && self.changes_descriptors
     }
 }
 
@@ -327,8 +252,7 @@ impl Document {
 
 /// Significant decimal digits of every measured number in `audit.json`.
 ///
-/// Six digits resolve a micron in a meter, far below any threshold and far above the rounding noise
-/// of sums.
+/// Six digits resolve a micron in a meter, far below any threshold and far above the rounding noise of sums.
 pub const SIGNIFICANT_DIGITS: usize = 6;
 
 /// Returns `value` as JSON, with numbers rounded as in `audit.json`.

@@ -7,16 +7,6 @@ use crate::document::{ByThreshold, Row};
 use crate::results::{Results, distinct};
 use crate::words;
 
-/// The error curve of one row of the results.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ErrorCdf {
-    /// Index into [`Document::results`](crate::Document::results).
-    pub row: usize,
-    /// (error in the row's unit, percent of the released points within it), ascending; a hundred
-    /// points suffice.
-    pub points: Vec<(f64, f64)>,
-}
-
 /// Returns what the titles of the charts state.
 pub(crate) fn findings(results: &Results<'_>) -> Value {
     json!({
@@ -92,14 +82,13 @@ pub(crate) fn judged(row: &Row) -> Vec<(f64, f64)> {
 }
 
 /// Returns the data of the script, without those of the 3D view and the pictures.
-pub(crate) fn page_data(results: &Results<'_>, error_cdf: &[ErrorCdf]) -> Value {
+pub(crate) fn page_data(results: &Results<'_>) -> Value {
     let givens = givens(results);
     let solvers = distinct(results.rows.iter().map(|row| row.solver.as_str()));
     let by_threshold = |map: &ByThreshold| {
         results.thresholds.iter().map(|typed| map.get(*typed).copied()).collect::<Vec<_>>()
     };
-    let rows = results.rows.iter().enumerate().map(|(index, row)| {
-        let cdf = error_cdf.iter().find(|cdf| cdf.row == index);
+    let rows = results.rows.iter().map(|row| {
         let strongest = results.thresholds.iter().map(|typed| {
             let strongest = results.strongest_given(&row.scheme, row, typed);
             strongest.is_some_and(|best| std::ptr::eq(best, row))
@@ -113,7 +102,7 @@ pub(crate) fn page_data(results: &Results<'_>, error_cdf: &[ErrorCdf]) -> Value 
             "ratio": row.inlier_ratio,
             "strongest": strongest.collect::<Vec<bool>>(),
             "recovered": by_threshold(&row.recovered_percent),
-            "errors": cdf.map_or_else(|| percentile_points(row), |cdf| cdf.points.clone()),
+            "errors": error_curve(row),
             "reliability": judged(row),
             "unknown": row.sure_unknown,
         })
@@ -134,7 +123,8 @@ pub(crate) fn page_data(results: &Results<'_>, error_cdf: &[ErrorCdf]) -> Value 
     })
 }
 
-fn percentile_points(row: &Row) -> Vec<(f64, f64)> {
+/// Returns the curve of errors: (error in the unit of the row, percent of the released points within it), ascending.
+fn error_curve(row: &Row) -> Vec<(f64, f64)> {
     let points = row.error_percentiles.iter();
     let mut points: Vec<(f64, f64)> =
         points.filter_map(|(percent, error)| Some(((*error)?, percent.parse().ok()?))).collect();
@@ -142,7 +132,7 @@ fn percentile_points(row: &Row) -> Vec<(f64, f64)> {
     let shares = row.recovered_percent.iter();
     let shares = shares.filter_map(|(typed, &percent)| Some((typed.parse().ok()?, percent)));
     let shares: Vec<(f64, f64)> = shares.collect();
-    // As in measured curves, smaller errors are no different.
+    // Smaller errors are no different.
     let least = 0.01 * shares.iter().fold(0.0, |largest: f64, share| largest.max(share.0));
     points.extend(shares);
     points.iter_mut().for_each(|point| point.0 = point.0.max(least));

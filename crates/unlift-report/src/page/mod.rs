@@ -18,7 +18,6 @@ use crate::attack::{self, Basis};
 use crate::document::{Document, Error};
 use crate::gates::gates;
 use crate::page::blocks::Blocks;
-use crate::page::curves::ErrorCdf;
 use crate::page::inversions::Inversion;
 use crate::page::pictures::Picture;
 use crate::page::scene::Scene3d;
@@ -57,8 +56,7 @@ const SCRIPTS: [&str; 8] = [
 
 /// Draws `document` as one self-contained HTML page below 10 MB.
 ///
-/// With [`RenderOptions::share_safe`] the scene and pictures are ignored and names are withheld, whatever the
-/// document holds.
+/// With [`RenderOptions::share_safe`] the scene and pictures are ignored and names are withheld, whatever the document holds.
 ///
 /// # Errors
 ///
@@ -80,7 +78,7 @@ pub fn render(document: &Document, options: &RenderOptions) -> Result<String, Er
     let scene = scene.and_then(|scene| scene::encode(scene, results.rows, error_unit, &mut blocks));
     let within = results.headline.parse().unwrap_or(10.0);
     let encoded = pictures::encode(pictures, within, &mut blocks);
-    let mut data = curves::page_data(results, &options.error_cdf);
+    let mut data = curves::page_data(results);
     data["scene"] = scene.into();
     data["first_picture"] = pictures::first_choice(pictures, within).into();
     data["pictures"] = encoded.into();
@@ -198,8 +196,6 @@ pub struct RenderOptions {
     pub share_safe: bool,
     /// The 3D view of a map.
     pub scene: Option<Scene3d>,
-    /// Error curves finer than the percentiles of the document; may be empty.
-    pub error_cdf: Vec<ErrorCdf>,
     /// Images to draw, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES); empty for maps.
     pub pictures: Vec<Picture>,
     /// Pictures that a network painted from recovered points.
@@ -213,8 +209,7 @@ pub struct RenderOptions {
 pub struct Opening(Value);
 
 impl Opening {
-    /// Returns the opening of another audit under a title; `details` is a link to that audit's own
-    /// page.
+    /// Returns the opening of another audit under a title; `details` is a link to that audit's own page.
     pub fn titled(
         document: &Document,
         inversions: &[Inversion],
@@ -244,8 +239,7 @@ pub struct Shares {
     pub title: String,
     /// Percent from the released data alone; `None` if no such attack was tried.
     pub today: Option<f64>,
-    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an
-    /// oracle.
+    /// Percent with known neighbors, at the tested inlier ratio nearest to one half; `None` without an oracle.
     pub known: Option<f64>,
     /// How many pictures can be rebuilt from the released data alone; `None` if no picture was painted.
     pub pictures: Option<String>,

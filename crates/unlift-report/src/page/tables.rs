@@ -138,7 +138,8 @@ pub(crate) fn errors(results: &Results<'_>) -> Table {
     columns.push(figure("median of a blind guess", move |row| error(row, row.blind_median_error)));
     let percentiles = results.rows.iter().flat_map(|row| row.error_percentiles.keys());
     // Percentile 50 is the median, which has its own column.
-    for key in distinct(percentiles.filter(|key| *key != "50")) {
+    let is_shown = |key: &&String| key.parse::<f64>().is_ok_and(|percent| percent > 50.0);
+    for key in distinct(percentiles.filter(is_shown)) {
         let of = move |row: &Row| error(row, row.error_percentiles.get(key).copied().flatten());
         columns.push(figure(format!("{key} % within"), of));
     }
@@ -282,8 +283,7 @@ pub(crate) fn likeness(results: &Results<'_>) -> Option<Table> {
     Some(with_unprotected(table, unprotected).without_empty_columns())
 }
 
-/// Returns the table of the photos' objects that are found again in the pictures, a column per class; `None` if no row
-/// has any.
+/// Returns the table of the photos' objects that are found again in the pictures, a column per class; `None` if no row has any.
 pub(crate) fn objects(results: &Results<'_>) -> Option<Table> {
     let first = results.rows.iter().find(|row| row.metrics.contains_key("objects_found"))?;
     let names = results.rows.iter().flat_map(|row| row.metrics.keys());

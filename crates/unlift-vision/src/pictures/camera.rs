@@ -156,6 +156,12 @@ impl Lens {
         Intrinsics { focal: self.focal, principal: self.center.map(|x| x - 0.5) }
     }
 
+    /// Returns where a pinhole camera sees what this one sees at `place`.
+    pub fn undistorted(&self, pinhole: &Intrinsics, place: [f64; 2]) -> Option<[f64; 2]> {
+        let flat = self.undistort(place)?;
+        Some([0, 1].map(|c| pinhole.focal[c] * flat[c] + pinhole.principal[c]))
+    }
+
     /// Returns where the point that [`project`](Self::project) maps to `place` is on the plane at
     /// focal length one; `None` beyond a right angle from the axis, or without such a point.
     pub fn undistort(&self, place: [f64; 2]) -> Option<[f64; 2]> {

@@ -1,7 +1,6 @@
 //! Object detection in pictures.
 //!
-//! Only objects of everyday classes are detected. To protect the people in the photos, text is not
-//! read and faces are not compared.
+//! Only objects of everyday classes are detected. To protect the people in the photos, text is not read and faces are not compared.
 
 use crate::features::ColorImage;
 use crate::network::{Network, Tensor};

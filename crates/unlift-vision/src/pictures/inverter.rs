@@ -67,14 +67,12 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
     Err(Error::new("image size", expected, format!("{width} x {height}")))
 }
 
-/// Makes the feature image of points in an image of `size` (width, height) pixels, in cells of
-/// [`CELL`] pixels: `(1, columns + 3, height, width)`, or `(1, columns + 7, height, width)` with
-/// `colored`.
+/// Makes the feature image of points in an image of `size` (width, height) pixels, in cells of [`CELL`] pixels: `(1, columns + 3,
+/// height, width)`, or `(1, columns + 7, height, width)` with `colored`.
 ///
-/// Channels: the descriptor (of unit length, times the root of its columns); with `colored`, four for
-/// the color of the point, which is not known; the position inside the cell from -1 to 1; the
-/// weight. Several points in a cell give their weighted mean and the largest weight; with depths,
-/// the nearest point. Cells without points are zero.
+/// Channels: the descriptor (of unit length, times the root of its columns); with `colored`, four for the color of the point, which
+/// is not known; the position inside the cell from -1 to 1; the weight. Several points in a cell give their weighted mean and the
+/// largest weight; with depths, the nearest point. Cells without points are zero.
 ///
 /// # Errors
 /// If columns differ in length, a side has less than 2 pixels, or the image more than 2^24.

@@ -80,9 +80,8 @@ fn similarity(sums: Sums) -> f64 {
 
 /// Returns the mean structural similarity over all windows of 7 x 7 pixels and all colors.
 ///
-/// Source: Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity",
-/// IEEE TIP 2004, with the defaults of scikit-image, which inversion papers use: uniform windows,
-/// sample covariance.
+/// Source: Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity", IEEE TIP 2004, with the
+/// defaults of scikit-image, which inversion papers use: uniform windows, sample covariance.
 ///
 /// # Errors
 /// If the pictures differ in size, or a side has less than 7 pixels.

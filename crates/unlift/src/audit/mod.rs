@@ -5,11 +5,14 @@
 mod break_even;
 mod cells;
 mod clock;
+pub mod doubts;
+pub mod frames;
 mod lists;
 mod many;
 mod missing;
 mod observer;
 mod plan;
+pub mod published;
 mod row;
 mod run;
 mod share;

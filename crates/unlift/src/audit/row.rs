@@ -15,7 +15,7 @@ use crate::truth::{DropReason, Original, Secret};
 use crate::{Error, Unit};
 
 /// Percentiles of the error in a row.
-pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
+pub const PERCENTILES: [f64; 9] = [2.0, 5.0, 10.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0];
 
 /// Numbers of points by reason.
 pub type ByReason = BTreeMap<String, usize>;

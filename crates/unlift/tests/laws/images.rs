@@ -87,7 +87,7 @@ fn rows_are_pooled_over_keypoints() {
         let places = |r: &Row| r.distinct.as_ref().unwrap().n_places;
         assert_eq!(places(row), places(a) + places(b));
         assert!(places(b) == b.n_points && places(a) < a.n_points);
-        let median = |r: &Row| r.error_percentiles[0].unwrap();
+        let median = |r: &Row| r.median_error.unwrap();
         let (low, high) = (median(a).min(median(b)), median(a).max(median(b)));
         let slack = 1.0 + 1e-3;
         assert!(median(row) >= low / slack && median(row) <= high * slack, "{}", row.scheme);

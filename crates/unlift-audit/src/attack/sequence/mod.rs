@@ -32,14 +32,14 @@ use unlift_report::Document;
 use unlift_report::attack::{SEQUENCE, SEQUENCE_AND_LISTS, TRACKS};
 use unlift_report::document::ImageCounts;
 use unlift_report::inversions::Inversion as Sheet;
-use unlift_vision::pictures::Points;
+use unlift_vision::pictures::{Points, trusted};
 
 use self::view::{Model, View};
 use super::names;
 use crate::audit::{Audit, Audited};
 use crate::document::{Attacked, Tried};
 use crate::images::{FeatureSource, Opened, evenly};
-use crate::inversion::{Inversion, trusted};
+use crate::inversion::Inversion;
 use crate::maps::released::slot_of;
 use crate::sources::BY_DESCRIPTORS;
 use crate::{Error, Progress, check_stop};
@@ -247,8 +247,7 @@ fn hide(
     Ok(hidden?.into_iter().unzip())
 }
 
-/// Returns, per query, the slot under `known` of each slot under `secrets`; `None` if they do not hide
-/// the same keypoints.
+/// Returns, per query, the slot under `known` of each slot under `secrets`; `None` if they do not hide the same keypoints.
 fn orders(known: &[Secret], secrets: &[Secret]) -> Option<Vec<Vec<u32>>> {
     let of_query = |(known, secret): (&Secret, &Secret)| {
         let slots = slot_of(known);

@@ -1,11 +1,11 @@
-//! The owner's side of each query: its keypoints, its camera, and the points of the model that they
-//! show.
+//! The owner's side of each query: its keypoints, its camera, and the points of the model that they show.
 
 use std::path::Path;
 
 use rayon::prelude::*;
 use unlift::geometry::camera::{Camera, Intrinsics, PoseError};
 use unlift::geometry::frame::Bounds;
+use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::distance;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
@@ -16,10 +16,9 @@ use unlift_io::read::colmap::{self, Image};
 use unlift_vision::pictures::Lens;
 
 use crate::images::FeatureSource;
-use crate::images::keypoints::{Nearby, other_size, undistorted};
+use crate::images::other_size;
 
-/// A keypoint shows a point of the model if it is the nearest one to the point's projection and at
-/// most this far away, in pixels.
+/// A keypoint shows a point of the model if it is the nearest one to the point's projection and at most this far away, in pixels.
 const SHOWS_PX: f64 = 2.0;
 /// Places on each side of an image whose undistorted places bound the undistorted image.
 const PER_SIDE: usize = 32;
@@ -124,7 +123,7 @@ impl Model {
             .ok_or_else(|| wrong("a camera with less than 180 degrees", "a wider one"))?;
         let pinhole = lens.intrinsics();
         let place = |(row, &keypoint): (usize, &[f64; 2])| {
-            let place = undistorted(&lens, &pinhole, keypoint)?;
+            let place = lens.undistorted(&pinhole, keypoint)?;
             bounds.contains(&place).then_some((row as u32, place))
         };
         let (kept, places): (Vec<u32>, Vec<[f64; 2]>) =
@@ -156,11 +155,12 @@ impl Model {
     ) -> Vec<Option<u32>> {
         let keypoints: Vec<[f64; 2]> =
             kept.iter().map(|&at| features.keypoints[at as usize]).collect();
-        let nearby = Nearby::new(&keypoints, SHOWS_PX);
+        let nearby = Knn::new(&keypoints).ok();
         let mut shows: Vec<Option<(f64, u32)>> = vec![None; kept.len()];
         for &row in &self.shown[of] {
             let x = self.images[of].pose.in_camera(&self.positions[row as usize]);
-            let nearest = lens.project(x).and_then(|place| nearby.nearest(&place));
+            let nearest =
+                lens.project(x).and_then(|place| nearby.as_ref()?.nearest_within(place, SHOWS_PX));
             let Some((distance2, at)) = nearest else { continue };
             if shows[at].is_none_or(|(nearest2, _)| distance2 < nearest2) {
                 shows[at] = Some((distance2, row));
@@ -177,7 +177,7 @@ fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
         let [x, y] = size.map(|side| side * t - 0.5);
         let [right, bottom] = size.map(|side| side - 0.5);
         for place in [[x, -0.5], [x, bottom], [-0.5, y], [right, y]] {
-            let place = undistorted(lens, &lens.intrinsics(), place)?;
+            let place = lens.undistorted(&lens.intrinsics(), place)?;
             for c in 0..2 {
                 low[c] = low[c].min(place[c]);
                 high[c] = high[c].max(place[c]);

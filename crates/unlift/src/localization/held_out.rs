@@ -1,38 +1,43 @@
 //! Localization of held-out images: their keypoints are matched with a map that was made without
 //! them, and their poses are estimated from the matches.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use unlift::descriptors::Values;
-use unlift::geometry::camera::{Camera, PoseError};
-use unlift::geometry::frame::Bounds;
-use unlift::geometry::vector::{distance, median};
-use unlift::localization::{Localization, Match, OnLine, View, estimate, free_directions};
-use unlift::obfuscate::{Change, Scheme, obfuscate};
-use unlift::seed::{Key, Stage};
-use unlift::truth::Original;
-use unlift::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
-use unlift_io::read::colmap;
-use unlift_report::document::{FEWEST_HELD_OUT, HeldOut};
-use unlift_vision::features::Extraction;
-use unlift_vision::features::photo::Turn;
-use unlift_vision::pictures::Lens;
 
+use super::cost::FEWEST_HELD_OUT;
+use super::estimate::{Match, OnLine, estimate};
 use super::matches::{Pair, Unit32, mutual, with_protected};
-use crate::Progress;
-use crate::images::FeatureSource;
-use crate::images::keypoints::{Nearby, other_size, undistorted};
-use crate::maps::Cameras;
+use super::{View, free_directions};
+use crate::descriptors::Values;
+use crate::geometry::camera::{Camera, PoseError};
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::{distance, median};
+use crate::obfuscate::{Change, Scheme, obfuscate};
+use crate::seed::{Key, Stage};
+use crate::truth::Original;
+use crate::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
 
 /// A keypoint belongs to a point that its image observes if it is this near to the projection, in
 /// pixels. Right matches have the same limit.
-const NEAR: f64 = 3.0;
+pub const NEAR: f64 = 3.0;
 /// Smallest number of other images in which a point of the map must be found.
 const FEWEST_OTHERS: usize = 2;
 /// Standard deviation of the centers of starts, as a share of the distance to the points.
 const REACH: f64 = 0.1;
+
+/// The keypoints of an image of a map.
+#[derive(Debug)]
+pub struct Photo {
+    /// The number of its view.
+    pub view: usize,
+    /// Keypoints in pixels of the pinhole, and their rows among `descriptors`.
+    pub places: Vec<([f64; 2], usize)>,
+    /// One row per keypoint.
+    pub descriptors: Descriptors,
+    /// Points that the image observes, with the row of the keypoint of each.
+    pub of_points: Vec<(usize, usize)>,
+}
 
 struct Query {
     /// The camera with its true pose.
@@ -69,72 +74,40 @@ pub struct Held<'a> {
 }
 
 impl<'a> Held<'a> {
-    /// Holds out every `nth` image of those with features in `path`, a folder of photos or a file.
-    /// Makes the descriptor of every point from its keypoints in the other images.
+    /// Holds out every `nth` of `photos`, which are of images among `views`. Makes the descriptor of every point from its keypoints in
+    /// the other photos.
     ///
     /// # Errors
-    /// If `path` cannot be read, a photo does not have the size of its camera, or too few images of
-    /// the map have features.
-    pub fn open(
-        path: &Path,
-        nth: usize,
-        cameras: &'a Cameras,
+    /// If there are too few photos, their descriptors differ in length, or they show no point.
+    pub fn new(
         original: &'a Original<3>,
-        progress: &dyn Progress,
-    ) -> Result<Self, crate::Error> {
-        let source = FeatureSource::open(path, &Extraction::default())?.with_turn(Turn::AsStored);
-        let names = &source.names;
-        let numbered = |(at, (name, _)): (usize, &(Vec<u8>, colmap::Camera))| {
-            Some((at, names.binary_search_by(|other| other.as_bytes().cmp(name)).ok()?))
-        };
-        let images = cameras.images.iter().enumerate().filter_map(numbered).collect::<Vec<_>>();
+        views: &'a [View],
+        photos: Vec<Photo>,
+        nth: usize,
+    ) -> Result<Self, Error> {
         let positions = original.reveal().positions();
-        let read = |&(at, number): &(usize, usize)| {
-            let features = source.get(number)?;
-            let view = &cameras.views[at];
-            if let Some((expected, found)) = other_size(features.size, view.size) {
-                let place = format!("image {}", features.name.escape_debug());
-                return Ok((at, Err(unlift_io::Error::new(path, place, expected, found))));
-            }
-            let camera = &cameras.images[at].1;
-            let lens = Lens::try_new(camera.model.name, &camera.params)?;
-            let Some(descriptors) = features.descriptors else {
-                return Err(Error::new("features", "descriptors", "none").into());
-            };
-            let photo = Photo::new(view, &lens, &features.keypoints, descriptors, positions);
-            Ok::<_, crate::Error>((at, Ok(photo)))
-        };
-        let mut photos = Vec::new();
-        for found in images.par_iter().map(read).collect::<Vec<_>>() {
-            match found {
-                Ok((at, photo)) => photos.push((at, photo?)),
-                Err(error) => progress.say(&format!("note: not localized: {error}")),
-            }
-        }
-        photos.sort_by(|(a, _), (b, _)| cameras.images[*a].0.cmp(&cameras.images[*b].0));
         let is_held = |at: usize| at % nth == nth / 2;
         let n_held = (0..photos.len()).filter(|&at| is_held(at)).count();
         if n_held == 0 || photos.len() - n_held < FEWEST_OTHERS {
             let expected = format!(
-                "features of an image to hold out, and of at least {FEWEST_OTHERS} others of the map"
+                "of an image to hold out, and of at least {FEWEST_OTHERS} others of the map"
             );
             let found = format!("{} images, {n_held} of them to hold out", photos.len());
-            return Err(unlift_io::Error::new(path, "", expected, found).into());
+            return Err(Error::new("features", expected, found));
         }
-        let dim = photos[0].1.descriptors.dim();
-        if let Some((_, photo)) = photos.iter().find(|(_, photo)| photo.descriptors.dim() != dim) {
-            let found = photo.descriptors.dim().to_string();
+        let dim = photos[0].descriptors.dim();
+        if let Some(photo) = photos.iter().find(|photo| photo.descriptors.dim() != dim) {
             let expected = format!("{dim} values per descriptor in every image");
-            return Err(unlift_io::Error::new(path, "", expected, found).into());
+            return Err(Error::new("features", expected, photo.descriptors.dim()));
         }
-        let mut held = vec![false; cameras.views.len()];
+        let mut held = vec![false; views.len()];
         let (mut queries, mut sums) = (Vec::new(), vec![0.0_f32; positions.len() * dim]);
         let mut found = vec![0; positions.len()];
-        let is_bytes = matches!(photos[0].1.descriptors.values(), Values::U8(_));
-        for (number, (at, photo)) in photos.into_iter().enumerate() {
+        let is_bytes = matches!(photos[0].descriptors.values(), Values::U8(_));
+        for (number, photo) in photos.into_iter().enumerate() {
             if is_held(number) {
-                held[at] = true;
-                let View { camera, size, .. } = cameras.views[at];
+                held[photo.view] = true;
+                let View { camera, size, .. } = views[photo.view];
                 let (places, rows): (Vec<_>, Vec<_>) = photo.places.into_iter().unzip();
                 let descriptors = Unit32::of(&photo.descriptors, rows.into_iter());
                 queries.push(Query { camera, size, places, descriptors });
@@ -151,7 +124,7 @@ impl<'a> Held<'a> {
         let parts: Vec<usize> = (0..positions.len()).filter(|&row| is_part[row]).collect();
         if parts.is_empty() {
             let expected = "keypoints at the projections of the map's points";
-            return Err(unlift_io::Error::new(path, "", expected, "none").into());
+            return Err(Error::new("features", expected, "none"));
         }
         // Mitigations learn from all rows, so the other rows have the same distribution.
         let row = |row: usize| if is_part[row] { row } else { parts[row % parts.len()] };
@@ -166,7 +139,7 @@ impl<'a> Held<'a> {
             true => Values::U8(scaled.map(|x| x.round() as u8).collect()),
             false => Values::F32(scaled.collect()),
         };
-        let others = cameras.views.iter().zip(&held).filter(|(_, is_held)| !**is_held);
+        let others = views.iter().zip(&held).filter(|(_, is_held)| !**is_held);
         let others = others.map(|(view, _)| view).collect();
         let descriptors = Descriptors::try_new(values, dim)?;
         Ok(Self { original, others, queries, descriptors, is_part, known: Vec::new() })
@@ -214,8 +187,7 @@ impl<'a> Held<'a> {
         }))
     }
 
-    /// Returns the problems of all images, whose keypoints `scheme` protects, with the map in the
-    /// clear.
+    /// Returns the problems of all images, whose keypoints `scheme` protects, with the map in the clear.
     pub fn with_queries(
         &mut self,
         scheme: &dyn Scheme<2>,
@@ -335,9 +307,9 @@ pub struct Problem {
     pub matches: Vec<Match>,
     /// The pose of the most similar other image, and the standard deviation of further starts.
     start: Option<(Camera, f64)>,
-    n_pairs: usize,
+    pub(super) n_pairs: usize,
     /// Matches within 3 px of the true projection.
-    n_right: usize,
+    pub(super) n_right: usize,
 }
 
 impl Problem {
@@ -353,70 +325,4 @@ impl Problem {
 pub fn locate(problems: &[Problem], seed: u64) -> Vec<Option<PoseError>> {
     let of = |(at, problem): (usize, &Problem)| problem.solve(seed.wrapping_add(at as u64));
     problems.par_iter().enumerate().map(of).collect()
-}
-
-/// Summarizes the errors of all images beside the unprotected ones. `limits` are pairs of errors
-/// with their names.
-pub fn summary(
-    problems: &[Problem],
-    [errors, unprotected]: [&[Option<PoseError>]; 2],
-    limits: &[(String, f64, f64)],
-) -> HeldOut {
-    let [own, base] = [errors, unprotected].map(|errors| Localization::of(errors, errors));
-    let middle = |count: fn(&Problem) -> usize| {
-        let mut counts: Vec<usize> = problems.iter().map(count).collect();
-        counts.sort_unstable();
-        // The upper one of an even number.
-        counts.get(counts.len() / 2).map_or(f64::INFINITY, |&n| n as f64)
-    };
-    let recall = |(name, max_center, max_angle): &(String, f64, f64)| {
-        let is_within = |error: &&PoseError| {
-            error.center <= *max_center && error.rotation_degrees <= *max_angle
-        };
-        let n = errors.iter().flatten().filter(is_within).count();
-        (name.clone(), 100.0 * n as f64 / errors.len().max(1) as f64)
-    };
-    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
-    HeldOut {
-        n_images: problems.len() as u64,
-        right_matches: middle(|problem| problem.n_right),
-        matches: middle(|problem| problem.n_pairs),
-        center_error: finite(own.center),
-        rotation_error_degrees: finite(own.rotation_degrees),
-        // If most unprotected images have no pose, the quotient is 0, which would look precise.
-        multiple: finite(own.center / base.center).filter(|multiple| *multiple > 0.0),
-        recall_percent: limits.iter().map(recall).collect(),
-    }
-}
-
-struct Photo {
-    /// Keypoints in pixels of the pinhole, and their rows among `descriptors`.
-    places: Vec<([f64; 2], usize)>,
-    descriptors: Descriptors,
-    /// Points that the photo observes, with the row of the keypoint of each.
-    of_points: Vec<(usize, usize)>,
-}
-
-impl Photo {
-    fn new(
-        view: &View,
-        lens: &Lens,
-        keypoints: &[[f64; 2]],
-        descriptors: Descriptors,
-        positions: &[[f64; 3]],
-    ) -> Self {
-        let nearby = Nearby::new(keypoints, NEAR);
-        let of_points = view.observed.iter().filter_map(|&row| {
-            let place = lens.project(view.camera.pose.in_camera(&positions[row as usize]))?;
-            Some((row as usize, nearby.nearest(&place)?.1))
-        });
-        let of_points = of_points.collect();
-        let flat = |(row, place): (usize, &[f64; 2])| {
-            let place = undistorted(lens, &view.camera.intrinsics, *place)?;
-            let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
-            is_inside.then_some((place, row))
-        };
-        let places = keypoints.iter().enumerate().filter_map(flat).collect();
-        Self { places, descriptors, of_points }
-    }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use unlift::geometry::camera::{Camera, Pose};
 use unlift::localization::View;
-use unlift_io::read::colmap;
 
+use super::colmap;
 use crate::Error;
 
 /// The cameras of a map in the unit of an audit.
@@ -23,9 +23,11 @@ pub struct Cameras {
 }
 
 impl Cameras {
-    /// Reads the cameras and tracks of the COLMAP model in `model`. `rows` are the points of the
-    /// audit among the points of the model; lengths are multiplied by `scale`. Returns no views if
-    /// the points have no tracks.
+    /// Reads the cameras and tracks of the COLMAP model in `model`. `rows` are the points of the audit among the points of the
+    /// model; lengths are multiplied by `scale`. Returns no views if the points have no tracks.
+    ///
+    /// # Errors
+    /// If a file of the model is broken.
     pub fn read(model: &Path, rows: &[u32], scale: f64) -> Result<Self, Error> {
         let named = |name: &str| {
             let files = ["bin", "txt"].map(|end| model.join(format!("{name}.{end}")));
@@ -56,7 +58,8 @@ impl Cameras {
         Ok(read)
     }
 
-    pub(crate) fn note(&self) -> Option<String> {
+    /// Returns a note about the images that are left out.
+    pub fn note(&self) -> Option<String> {
         let what = "images are left out: their cameras have no focal length";
         (self.left_out > 0).then(|| format!("localization: {} {what}", self.left_out))
     }

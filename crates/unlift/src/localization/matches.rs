@@ -1,8 +1,8 @@
 //! Matches of descriptors: mutually most similar rows that pass the ratio test.
 
-use unlift::descriptors::Values;
-use unlift::protected::{Rule, inner};
-use unlift::{Descriptors, Error, ProtectedDescriptors};
+use crate::descriptors::Values;
+use crate::protected::{Rule, inner};
+use crate::{Descriptors, Error, ProtectedDescriptors};
 
 /// Largest ratio of the distances to the most similar descriptor and the next one.
 const RATIO: f32 = 0.8;
@@ -11,13 +11,14 @@ const RATIO: f32 = 0.8;
 pub type Pair = (usize, usize);
 
 /// Rows of unit length, or zero.
-#[derive(PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Unit32 {
     dim: usize,
     values: Vec<f32>,
 }
 
 impl Unit32 {
+    /// Scales the `rows` of `descriptors`.
     pub fn of(descriptors: &Descriptors, rows: impl Iterator<Item = usize>) -> Self {
         let dim = descriptors.dim();
         let (mut values, mut descriptor) = (Vec::new(), vec![0.0; dim]);
@@ -30,7 +31,7 @@ impl Unit32 {
         Self { dim, values }
     }
 
-    pub fn plain(&self) -> Result<Descriptors, Error> {
+    pub(super) fn plain(&self) -> Result<Descriptors, Error> {
         Descriptors::try_new(Values::F32(self.values.clone()), self.dim)
     }
 
@@ -38,13 +39,12 @@ impl Unit32 {
         self.values.len() / self.dim
     }
 
-    pub fn row(&self, at: usize) -> &[f32] {
+    pub(super) fn row(&self, at: usize) -> &[f32] {
         &self.values[at * self.dim..][..self.dim]
     }
 }
 
-/// Rows of one side that are compared with a block of the other at a time, so that both stay in the
-/// cache.
+/// Rows of one side that are compared with a block of the other at a time, so that both stay in the cache.
 const BLOCK: usize = 64;
 
 /// Returns the mutually most similar rows that pass the ratio test.
@@ -61,7 +61,7 @@ pub fn mutual(a: &Unit32, b: &Unit32) -> Vec<Pair> {
 }
 
 /// Returns the matches of keypoints with points of a map; `of_keypoints` is true if the keypoints are protected, else the points are.
-pub fn with_protected(
+pub(super) fn with_protected(
     plain: &Unit32,
     protected: &ProtectedDescriptors,
     of_keypoints: bool,

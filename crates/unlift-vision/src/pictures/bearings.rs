@@ -1,12 +1,12 @@
-//! Views from the center of bearings, such as a sphere cloud. Directions are released, so nothing
-//! needs to be recovered.
+//! Views from the center of bearings, such as a sphere cloud. Directions are released, so nothing needs to be recovered.
 
 use unlift::Error;
 use unlift::geometry::camera::Pose;
 use unlift::neighbors::{REAL, Similarity, Source, support};
 use unlift::recover::Recovered;
 use unlift::released::{Obfuscation, Rays, Released};
-use unlift_vision::pictures::{Lens, View};
+
+use super::{Lens, View};
 
 /// Names of the views, with the camera axes right, down and forward.
 const SIX: [(&str, [[f64; 3]; 3]); 6] = [
@@ -21,6 +21,9 @@ const SIX: [(&str, [[f64; 3]; 3]); 6] = [
 const SIDE: usize = 640;
 
 /// Returns six views, by name, that together cover all directions from the center of `released`.
+///
+/// # Errors
+/// If its records are no bearings.
 pub fn six_views(released: &Released<3>) -> Result<Vec<(&'static str, View)>, Error> {
     let (_, center) = bearings(released)?;
     let center = std::array::from_fn(|c| released.origin()[c] + f64::from(center[c]));
@@ -31,8 +34,10 @@ pub fn six_views(released: &Released<3>) -> Result<Vec<(&'static str, View)>, Er
     Ok(SIX.into_iter().map(|(name, rotation)| (name, view(rotation))).collect())
 }
 
-/// Returns a place on every bearing of `released`, at distance 1 from the center. Bearings that look
-/// like decoys have none.
+/// Returns a place on every bearing of `released`, at distance 1 from the center. Bearings that look like decoys have none.
+///
+/// # Errors
+/// If records are no bearings, or have no descriptors.
 pub fn on_bearings(released: &Released<3>) -> Result<Recovered<3>, Error> {
     let (rays, center) = bearings(released)?;
     let source: &dyn Source<3> = &Similarity;

@@ -1,0 +1,292 @@
+//! Doubts: reasons why figures may be too small, because data does not belong together or lengths are unusual. Low recovery would look
+//! like protection.
+
+use std::borrow::Borrow;
+
+use super::{Row, Threshold};
+use crate::evaluate::{OFF_RECORD, Truth, are_strangers, nearer_to_own, recovered_away};
+use crate::geometry::knn::Knn;
+use crate::geometry::vector::{distance, median};
+use crate::recover::Recovered;
+use crate::released::Released;
+use crate::truth::{Original, Secret};
+use crate::{Descriptors, Error, PointSet, Unit};
+
+/// Number of points or descriptors that are examined: enough for quartiles.
+pub(super) const SAMPLE: usize = 2000;
+
+/// Tolerated share of points that are farther from their own records than the smallest threshold.
+const STRAY: f64 = 0.01;
+
+/// Usual median distance to the K-th neighbor in its own unit, whatever K the unit was made with.
+const UNIT: [f64; 2] = [0.2, 5.0];
+
+/// Quartiles of the distance to the K-th neighbor.
+#[derive(Clone, Copy, Debug)]
+pub struct NeighborDistances {
+    /// The lower quartile.
+    pub low: f64,
+    /// The median.
+    pub middle: f64,
+    /// The upper quartile.
+    pub high: f64,
+    /// Number of points of the map, or of its smallest part.
+    pub n_points: usize,
+}
+
+impl NeighborDistances {
+    /// Measures the parts of a map on a sample of their points. Neighbors are searched within a part.
+    ///
+    /// # Errors
+    /// If a part has no points.
+    pub fn of<P: Borrow<PointSet<3>>>(
+        parts: impl ExactSizeIterator<Item = Result<P, Error>>,
+        k: usize,
+    ) -> Result<Self, Error> {
+        let of_each = SAMPLE.div_ceil(parts.len().max(1));
+        let (mut distances, mut nearest, mut n_points) = (Vec::new(), Vec::new(), usize::MAX);
+        for part in parts {
+            let part = part?;
+            let points = part.borrow().positions();
+            let knn = Knn::new(points)?;
+            let kth = |row: usize| {
+                knn.nearest(row, k, &mut nearest);
+                nearest.last().map_or(0.0, |last| last.0.sqrt())
+            };
+            let every = points.len().div_ceil(of_each).max(1);
+            distances.extend((0..points.len()).step_by(every).map(kth));
+            n_points = n_points.min(points.len());
+        }
+        distances.sort_unstable_by(f64::total_cmp);
+        let last = distances.len().saturating_sub(1);
+        let at = |rank: usize| distances.get(rank).copied().unwrap_or(0.0);
+        Ok(Self { low: at(last / 4), middle: at(last / 2), high: at(last - last / 4), n_points })
+    }
+}
+
+/// Nothing is measured if the median distance of points from their own records is this many times that to the K-th neighbor.
+const APART: f64 = 4.0;
+
+/// Checks that the ground truth belongs to the records.
+///
+/// # Errors
+/// If most points are far from their own records.
+pub fn check_truth(
+    original: &Original<3>,
+    (released, secret): &(Released<3>, Secret),
+    usual: &NeighborDistances,
+) -> Result<(), Error> {
+    let truth = Truth { original, released, secret };
+    truth.belongs()?;
+    let (middle, unit) = (median(&mut truth.away_from_own()), released.unit());
+    let limit = APART * usual.middle;
+    if middle <= limit || truth.is_noise() {
+        return Ok(());
+    }
+    let expected = format!("records within {} of their own points", in_unit(limit, unit));
+    let found = format!("{}: not measured (another unit, scale or frame?)", in_unit(middle, unit));
+    Err(Error::new("truth", expected, found))
+}
+
+/// Returns a doubt about a release that was not made here, whose usual distance to the K-th neighbor is `middle`.
+pub fn of_release(
+    truth: &Truth<'_, 3>,
+    thresholds: &[Threshold],
+    k: usize,
+    middle: f64,
+) -> Option<String> {
+    let (least, unit) = (least(thresholds), truth.released.unit());
+    // A scheme's noise has a doubt of its own, and decoys hide no points.
+    let is_usual = truth.is_noise() || truth.released.obfuscation().is_bearings();
+    let away = if is_usual { Vec::new() } else { truth.away_from_own() };
+    rounded(truth.usual_rounding(), least, unit)
+        .or_else(|| strays(false, &away, least, unit))
+        .or_else(|| mistaken_unit(unit, k, middle))
+}
+
+/// Returns the smallest threshold.
+pub fn least(thresholds: &[Threshold]) -> f64 {
+    thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
+}
+
+/// Returns a doubt if 32 bits round records by more than [`NOISE`] of the smallest threshold.
+fn rounded(usual: f64, least: f64, unit: Unit) -> Option<String> {
+    let by = in_unit(usual, unit);
+    let doubt = format!(
+        "released: coordinates are so large that 32 bits round them by about {by}: subtract a place in the map from \
+         them, and write it as the array origin"
+    );
+    (usual > NOISE * least).then_some(doubt)
+}
+
+/// Returns a doubt about positions by their distances from their own records: the ground truth, or what was `recovered`.
+fn strays(recovered: bool, away: &[f64], least: f64, unit: Unit) -> Option<String> {
+    let (n, of) = (away.iter().filter(|&&away| away >= least).count(), away.len());
+    let (what, where_, it_is) = match recovered {
+        true => ("recovered", "where no hidden point is", "they are"),
+        false => ("truth", "where no attack can find them", "it is"),
+    };
+    let least = in_unit(least, unit);
+    let doubt = format!(
+        "{what}: {n} of {of} points are {least} or more away from their own records, {where_}: check that {it_is} \
+         of this map, in its frame, scale and order"
+    );
+    (n as f64 > STRAY * of as f64).then_some(doubt)
+}
+
+/// Returns a doubt if lengths are not in the unit that a file states.
+fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
+    let (is_usual, found) = ((UNIT[0]..=UNIT[1]).contains(&middle), short(middle));
+    let doubt = format!(
+        "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, because the file \
+         states lengths in multiples of it, found {found}: thresholds do not have their stated meaning"
+    );
+    (unit == Unit::KthNeighbor && !is_usual).then_some(doubt)
+}
+
+/// Number of other points with which a nearest point is compared.
+const OTHERS: usize = 16;
+
+/// Fewer points say nothing.
+const FEWEST: f64 = 30.0;
+
+/// Returns a doubt if descriptors are no more like those of the nearest points than like others, as in another order of rows.
+///
+/// # Errors
+/// If there are no points.
+pub fn unlike_neighbors(
+    points: &PointSet<3>,
+    descriptors: &Descriptors,
+) -> Result<Option<String>, Error> {
+    let (knn, n) = (Knn::new(points.positions())?, points.len());
+    let (mut nearest, mut share, rows) =
+        (Vec::new(), 0.0, (0..n).step_by(n.div_ceil(SAMPLE).max(1)));
+    let n_rows = rows.len() as f64;
+    for row in rows {
+        knn.nearest(row, 1, &mut nearest);
+        let like = |other: usize| descriptors.squared_distance(row, other);
+        let near = nearest.first().map_or(f32::INFINITY, |near| like(near.1 as usize));
+        let others = (1..=OTHERS).map(|at| like((row + 1 + at * (n - 1) / (OTHERS + 1)) % n));
+        let more = |other: f32| if near == other { 0.5 } else { f64::from(near < other) };
+        share += others.map(more).sum::<f64>() / (OTHERS as f64 * n_rows);
+    }
+    // The share of a point deviates by 0.3, so this is three deviations.
+    let doubt = format!(
+        "descriptors: {:.0} % are more like that of the nearest point than like another one, where 50 % are so by \
+         chance: of another map, or in another order of rows?",
+        100.0 * share
+    );
+    Ok((n_rows >= FEWEST && share < 0.5 + 0.9 / n_rows.sqrt()).then_some(doubt))
+}
+
+/// Formats a length with three digits and its unit, if it has one.
+pub fn in_unit(length: f64, unit: Unit) -> String {
+    with_sign(&short(length), unit)
+}
+
+/// Adds the sign of the unit to a number, if it has one.
+pub fn with_sign(text: &str, unit: Unit) -> String {
+    match unit {
+        Unit::Meter | Unit::Pixel => format!("{text} {}", unit.name()),
+        Unit::KthNeighbor => text.to_owned(),
+    }
+}
+
+/// Checks by geometry that compared data belongs together, whatever the files state. Of data of
+/// another map hardly anything is recovered, which would look like protection.
+#[derive(Debug, Default)]
+pub struct Checked {
+    /// The number of positions nearer to their own point than to another one, and the number compared.
+    nearer: (usize, usize),
+    /// Distances of hidden points from their own records, if the records are given.
+    truth: Vec<f64>,
+    /// Distances of recovered positions from their own records, if the records are given.
+    recovered: Vec<f64>,
+}
+
+impl Checked {
+    /// Adds a map or an image.
+    ///
+    /// # Errors
+    /// If the truth does not belong to the released data.
+    pub fn add<const D: usize>(
+        &mut self,
+        recovered: &Recovered<D>,
+        original: &Original<D>,
+        secret: &Secret,
+        released: Option<&Released<D>>,
+    ) -> Result<(), Error> {
+        let (nearer, n) = nearer_to_own(recovered, original, secret, released);
+        self.nearer = (self.nearer.0 + nearer, self.nearer.1 + n);
+        if let Some(released) = released {
+            let truth = Truth { original, released, secret };
+            truth.belongs()?;
+            self.truth.extend(truth.away_from_own());
+            self.recovered.extend(recovered_away(released, recovered));
+        }
+        Ok(())
+    }
+
+    /// Returns the doubts about the figures.
+    ///
+    /// # Errors
+    /// If positions are those of another map.
+    pub fn notes(&self, thresholds: &[Threshold], unit: Unit) -> Result<Vec<String>, Error> {
+        if are_strangers(self.nearer) {
+            let expected = "nearer to their own records or points than to those of others";
+            let (nearer, n) = self.nearer;
+            let found = format!("{nearer} of {n} (of another map, or in another order of rows)");
+            return Err(Error::new("positions", expected, found));
+        }
+        let least = least(thresholds);
+        let truth = strays(false, &self.truth, least, unit);
+        let recovered = strays(true, &self.recovered, least, unit);
+        Ok(truth.into_iter().chain(recovered).collect())
+    }
+}
+
+/// Returns twice the distance from the median point within which 90 % of the points lie, so that a few outliers do not count.
+pub fn across(points: &[[f64; 3]]) -> f64 {
+    if points.is_empty() {
+        return 0.0;
+    }
+    let middle =
+        [0, 1, 2].map(|axis| median(&mut points.iter().map(|p| p[axis]).collect::<Vec<_>>()));
+    let mut distances: Vec<f64> = points.iter().map(|p| distance(p, &middle)).collect();
+    let at = (distances.len() - 1) * 9 / 10;
+    2.0 * *distances.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// Share of a threshold that noise of records may take. Attacks stay on records, and others may average noise away.
+const NOISE: f64 = 0.1;
+
+/// Returns a line about a row whose points are off their records, if that matters within `threshold`; always if it is infinite.
+pub fn noise(row: &Row, threshold: f64) -> Option<String> {
+    let off = *row.metrics.get(OFF_RECORD)?;
+    let (scheme, away) = (&row.scheme, in_unit(off, row.unit));
+    let doubt = format!(
+        "{scheme}: half of the points are {away} or more off their records, as by noise: attacks here stay on the records, \
+         others may average the noise away"
+    );
+    (!threshold.is_finite() || off > NOISE * threshold).then_some(doubt)
+}
+
+/// Formats three digits, with an exponent where there would be many zeros.
+pub fn short(length: f64) -> String {
+    if (1e-3..1e6).contains(&length) || length == 0.0 {
+        let digits = (2 - length.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+        return format!("{length:.digits$}");
+    }
+    format!("{length:.1e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_three_digits() {
+        let texts = [0.0154, 1.5, 85.23, 15_400.0, 3e-300, 7.2e9].map(short);
+        assert_eq!(texts, ["0.0154", "1.50", "85.2", "15400", "3.0e-300", "7.2e9"]);
+    }
+}
