@@ -40,14 +40,9 @@ impl Archive {
     }
 
     /// Returns index and name of each array, in the order of the archive.
-    pub fn arrays(&self) -> Result<Vec<(usize, String)>, Error> {
-        let mut arrays = Vec::new();
-        for (at, name) in self.zip.file_names().enumerate() {
-            let name = name
-                .map_err(|error| Error::new(&self.path, format!("entry {at}"), "a name", error))?;
-            arrays.extend(name.strip_suffix(".npy").map(|name| (at, name.to_owned())));
-        }
-        Ok(arrays)
+    pub fn arrays(&self) -> Vec<(usize, String)> {
+        let array = |(at, name): (usize, &str)| Some((at, name.strip_suffix(".npy")?.to_owned()));
+        self.zip.file_names().enumerate().filter_map(array).collect()
     }
 
     /// Starts reading the entry at index `at`, the array `name`.

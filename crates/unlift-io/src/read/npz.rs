@@ -12,7 +12,7 @@ use crate::stage;
 /// Reads positions from the array of points in a NumPy archive. Several or none are an error.
 pub fn positions(path: &Path) -> Result<Input, Error> {
     let mut archive = Archive::open(path)?;
-    let all = archive.arrays()?;
+    let all = archive.arrays();
     if all.iter().any(|(_, name)| name.rsplit('/').next() == Some("unlift")) {
         let kind = stage::declared_kind(path).map(|kind| kind.to_string());
         let found = kind.unwrap_or_else(|| "a stage file of unlift".to_owned());

@@ -31,7 +31,7 @@ pub(super) struct Arrays<'a> {
 impl<'a> Arrays<'a> {
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
-        let arrays = archive.arrays()?;
+        let arrays = archive.arrays();
         let archive = Arc::new(Mutex::new(archive));
         Self { path, archive, arrays, meta: Meta::empty(path) }.with_meta()
     }

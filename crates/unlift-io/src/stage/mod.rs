@@ -42,7 +42,7 @@ pub fn kind(path: &Path) -> Result<Kind, Error> {
 
 /// Returns true if the stage file `path` contains many images, below their names.
 pub fn has_images(path: &Path) -> Result<bool, Error> {
-    Ok(Archive::open(path)?.arrays()?.iter().any(|(_, name)| name.contains('/')))
+    Ok(Archive::open(path)?.arrays().iter().any(|(_, name)| name.contains('/')))
 }
 
 /// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and
