@@ -1,9 +1,8 @@
 //! What protection costs: rows of errors of localization.
 
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::held_out::Problem;
-use crate::audit::ByThreshold;
 use crate::geometry::camera::PoseError;
 
 /// The accuracy of localization under a scheme: medians over the images of the map.
@@ -49,7 +48,7 @@ pub struct HeldOut {
     /// The median error of the center as a multiple of the unprotected one.
     pub multiple: Option<f64>,
     /// Percent of the images within limits of both errors, by limit: `5 cm, 5 deg`.
-    pub recall_percent: ByThreshold,
+    pub recall_percent: IndexMap<String, f64>,
 }
 
 /// The value of [`Localization::scheme`] for the map without protection.
@@ -102,40 +101,6 @@ impl Localization {
     /// Returns true if what localization costs under this scheme was not measured.
     pub fn is_unknown(&self) -> bool {
         self.measured().is_none() && self.changes_descriptors
-    }
-}
-
-impl HeldOut {
-    /// Summarizes the errors of all images beside the unprotected ones. `limits` are pairs of errors with their names.
-    pub(super) fn of(
-        problems: &[Problem],
-        [errors, unprotected]: [&[Option<PoseError>]; 2],
-        limits: &[(String, f64, f64)],
-    ) -> Self {
-        let [own, base] = [errors, unprotected].map(|errors| Localization::of("", errors, errors));
-        let middle = |count: fn(&Problem) -> usize| {
-            let mut counts: Vec<usize> = problems.iter().map(count).collect();
-            counts.sort_unstable();
-            // The upper one of an even number.
-            counts.get(counts.len() / 2).map_or(f64::INFINITY, |&n| n as f64)
-        };
-        let recall = |(name, max_center, max_angle): &(String, f64, f64)| {
-            let is_within = |error: &&PoseError| {
-                error.center <= *max_center && error.rotation_degrees <= *max_angle
-            };
-            let n = errors.iter().flatten().filter(is_within).count();
-            (name.clone(), 100.0 * n as f64 / errors.len().max(1) as f64)
-        };
-        let multiple = own.center_error.zip(base.center_error).map(|(own, base)| own / base);
-        Self {
-            n_images: problems.len() as u64,
-            right_matches: middle(|problem| problem.n_right),
-            matches: middle(|problem| problem.n_pairs),
-            center_error: own.center_error,
-            rotation_error_degrees: own.rotation_error_degrees,
-            multiple: multiple.filter(|multiple| multiple.is_finite() && *multiple > 0.0),
-            recall_percent: limits.iter().map(recall).collect(),
-        }
     }
 }
 

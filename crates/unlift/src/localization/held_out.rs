@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::cost::FEWEST_HELD_OUT;
+use super::cost::{FEWEST_HELD_OUT, HeldOut, Localization};
 use super::estimate::{Match, OnLine, estimate};
 use super::matches::{Pair, Unit32, mutual, with_protected};
 use super::{View, free_directions};
@@ -307,9 +307,9 @@ pub struct Problem {
     pub matches: Vec<Match>,
     /// The pose of the most similar other image, and the standard deviation of further starts.
     start: Option<(Camera, f64)>,
-    pub(super) n_pairs: usize,
+    n_pairs: usize,
     /// Matches within 3 px of the true projection.
-    pub(super) n_right: usize,
+    n_right: usize,
 }
 
 impl Problem {
@@ -325,4 +325,38 @@ impl Problem {
 pub fn locate(problems: &[Problem], seed: u64) -> Vec<Option<PoseError>> {
     let of = |(at, problem): (usize, &Problem)| problem.solve(seed.wrapping_add(at as u64));
     problems.par_iter().enumerate().map(of).collect()
+}
+
+impl HeldOut {
+    /// Summarizes the errors of all images beside the unprotected ones. `limits` are pairs of errors with their names.
+    pub(super) fn of(
+        problems: &[Problem],
+        [errors, unprotected]: [&[Option<PoseError>]; 2],
+        limits: &[(String, f64, f64)],
+    ) -> Self {
+        let [own, base] = [errors, unprotected].map(|errors| Localization::of("", errors, errors));
+        let middle = |count: fn(&Problem) -> usize| {
+            let mut counts: Vec<usize> = problems.iter().map(count).collect();
+            counts.sort_unstable();
+            // The upper one of an even number.
+            counts.get(counts.len() / 2).map_or(f64::INFINITY, |&n| n as f64)
+        };
+        let recall = |(name, max_center, max_angle): &(String, f64, f64)| {
+            let is_within = |error: &&PoseError| {
+                error.center <= *max_center && error.rotation_degrees <= *max_angle
+            };
+            let n = errors.iter().flatten().filter(is_within).count();
+            (name.clone(), 100.0 * n as f64 / errors.len().max(1) as f64)
+        };
+        let multiple = own.center_error.zip(base.center_error).map(|(own, base)| own / base);
+        Self {
+            n_images: problems.len() as u64,
+            right_matches: middle(|problem| problem.n_right),
+            matches: middle(|problem| problem.n_pairs),
+            center_error: own.center_error,
+            rotation_error_degrees: own.rotation_error_degrees,
+            multiple: multiple.filter(|multiple| multiple.is_finite() && *multiple > 0.0),
+            recall_percent: limits.iter().map(recall).collect(),
+        }
+    }
 }
