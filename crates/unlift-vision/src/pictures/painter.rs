@@ -126,10 +126,10 @@ impl Painter {
         })
     }
 
-    /// Returns true if any recovered point is in front of the camera.
+    /// Returns true if any recovered point is inside the image.
     ///
     /// # Errors
-    /// If the lens cannot project.
+    /// If the image is too large.
     pub fn sees(&self, view: &View, recovered: &Recovered<3>) -> Result<bool, Error> {
         Ok(!view.project(&positions(recovered))?.points.is_empty())
     }
@@ -137,7 +137,7 @@ impl Painter {
     /// Makes the picture of `positions` as `view` sees them, each with the `weight` of its index and depth.
     ///
     /// # Errors
-    /// If the lens cannot project, or the network does not support the descriptors.
+    /// If the image is too large, or the network does not support the descriptors.
     pub fn points(
         &self,
         view: &View,

@@ -78,7 +78,8 @@ pub fn check_truth(
 ) -> Result<(), Error> {
     let truth = Truth { original, released, secret };
     truth.belongs()?;
-    let (middle, unit) = (median(&mut truth.away_from_own()), released.unit());
+    let (mut away, unit) = (truth.away_from_own(), released.unit());
+    let middle = if away.is_empty() { 0.0 } else { median(&mut away) };
     let limit = APART * usual.middle;
     if middle <= limit || truth.is_noise() {
         return Ok(());
@@ -147,8 +148,8 @@ fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
 /// Number of other points with which a nearest point is compared.
 const OTHERS: usize = 16;
 
-/// Fewer points say nothing.
-const FEWEST: f64 = 30.0;
+/// Smallest number of points whose figures say something.
+pub(super) const FEWEST: f64 = 30.0;
 
 /// Returns a doubt if descriptors are no more like those of the nearest points than like others, as in another order of rows.
 ///
@@ -274,7 +275,7 @@ pub fn noise(row: &Row, threshold: f64) -> Option<String> {
 /// Formats three digits, with an exponent where there would be many zeros.
 pub fn short(length: f64) -> String {
     if (1e-3..1e6).contains(&length) || length == 0.0 {
-        let digits = (2 - length.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+        let digits = (2 - libm::log10(length.max(1e-3)).floor() as i32).clamp(0, 6) as usize;
         return format!("{length:.digits$}");
     }
     format!("{length:.1e}")

@@ -1,4 +1,4 @@
-//! Whether two maps of one place are in one frame.
+//! Doubts about two maps that are not of one place, or not in one frame.
 
 use super::published::nearest_to;
 use crate::geometry::knn::Knn;

@@ -1,6 +1,6 @@
 //! What a released file gives away besides its records: values that are the points, and orders and columns that follow places.
 
-use super::doubts::{SAMPLE, across, least};
+use super::doubts::{FEWEST, SAMPLE, across, least};
 use super::{Alone, Share, Threshold};
 use crate::Descriptors;
 use crate::evaluate::correlation;
@@ -76,7 +76,7 @@ fn at_fixed_distances<'a>(
     [0, -1, -2].map(|power| {
         let step = |row: usize| {
             let length2 = dot(&vectors[row], &vectors[row]);
-            along(&[0.0; 3], length2.powf(0.5 * f64::from(power)), &vectors[row])
+            along(&[0.0; 3], libm::pow(length2, 0.5 * f64::from(power)), &vectors[row])
         };
         let multiple = |row: usize| {
             let step = step(row);
@@ -123,6 +123,10 @@ pub fn follows_places(
 /// Returns a doubt about each column of descriptors that follows a coordinate.
 fn columns(rows: &Descriptors, secret: &Secret, points: &[[f64; 3]]) -> Vec<String> {
     let slots = (0..secret.n_slots()).step_by(secret.n_slots().div_ceil(SAMPLE).max(1));
+    // Few values correlate by chance.
+    if (slots.len() as f64) < FEWEST {
+        return Vec::new();
+    }
     let (mut values, mut row) = (vec![Vec::new(); rows.dim()], vec![0.0; rows.dim()]);
     for slot in slots.clone() {
         rows.read_row(secret.descriptor_row()[slot] as usize, &mut row);

@@ -10,7 +10,7 @@ const RATIO: f32 = 0.8;
 /// A match of a keypoint with a point, by their rows.
 pub type Pair = (usize, usize);
 
-/// Rows of unit length, or zero.
+/// Descriptors scaled to unit length. Those that are zero stay zero.
 #[derive(Debug, PartialEq)]
 pub struct Unit32 {
     dim: usize,

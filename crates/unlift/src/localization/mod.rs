@@ -77,12 +77,11 @@ pub fn of_schemes(
                 .map(|(m, angle)| (format!("{:.0} cm, {angle} deg", 100.0 * m), m, angle))
                 .to_vec(),
             // Without a scale, multiples of the unprotected bound.
-            _ => {
-                let bound = rows[0].1.center_error.unwrap_or(0.0);
+            _ => rows[0].1.center_error.map_or(Vec::new(), |bound| {
                 [10.0, 30.0, 100.0]
                     .map(|times| (format!("{times} times the bound, 5 deg"), times * bound, 5.0))
                     .to_vec()
-            }
+            }),
         };
         let (n_rows, mut base) = (rows.len(), None);
         for (at, (protects, row)) in rows.iter_mut().enumerate() {
