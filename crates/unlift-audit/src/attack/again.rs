@@ -12,7 +12,6 @@ use serde_json::json;
 use unlift::Unit;
 use unlift::again::{Solved, by_descriptors, by_geometry};
 use unlift::audit::frames::doubt_of_frames;
-use unlift::audit::published::nearest_to;
 use unlift::audit::{NotAudited, Plan, Row, measure, records_alone};
 use unlift::evaluate::{blind, joined};
 use unlift::geometry::knn::Knn;
@@ -221,7 +220,8 @@ fn row(
     for (slot, link) in solved.links.iter().enumerate() {
         let Some(record) = link else { continue };
         let point = &points[own.hidden()[slot].index()];
-        let limit = nearest_to(*point, knn);
+        let nearest = knn.nearest_within(*point, f64::INFINITY);
+        let limit = nearest.map_or(f64::INFINITY, |(distance2, _)| distance2.sqrt());
         let slots = *record as usize * per_record..(*record as usize + 1) * per_record;
         let away = |hidden: &unlift::OriginalId| distance(&others[hidden.index()], point);
         n_right += usize::from(second_secret.hidden()[slots].iter().any(|at| away(at) <= limit));

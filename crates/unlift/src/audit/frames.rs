@@ -1,6 +1,5 @@
 //! Doubts about two maps that are not of one place, or not in one frame.
 
-use super::published::nearest_to;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, median};
 use crate::localization::{Unit32, mutual};
@@ -37,7 +36,7 @@ pub fn doubt_of_frames(
         _ => Vec::new(),
     };
     if pairs.len() < FEWEST {
-        let n = rows.iter().filter(|row| nearest_to(a[**row], &knn) <= near).count();
+        let n = rows.iter().filter(|row| knn.nearest_within(a[**row], near).is_some()).count();
         let message = format!(
             "second map: near {n} of {} points of the first one: in another frame?",
             rows.len()

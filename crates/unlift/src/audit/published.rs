@@ -44,7 +44,7 @@ pub fn read_from_file(
     let rounding = (ROUNDING * largest).min(least);
     let (all, values) = (Knn::new(points).ok(), published.iter().flatten().copied());
     let is_within = |at: [f64; 3], of: &Option<Knn<'_, 3>>, threshold: f64| {
-        of.as_ref().is_some_and(|of| nearest_to(at, of) <= threshold)
+        of.as_ref().and_then(|of| of.nearest_within(at, threshold)).is_some()
     };
     let open: Vec<[f64; 3]> = values.filter(|&value| is_within(value, &all, rounding)).collect();
     let open = Knn::new(&open).ok();
@@ -87,13 +87,6 @@ fn at_fixed_distances<'a>(
         let usual = if multiples.is_empty() { 0.0 } else { median(&mut multiples) };
         (0..from.len()).map(|row| along(&from[row], usual, &step(row))).collect()
     })
-}
-
-/// Returns the distance from a position to the nearest of `points`.
-pub fn nearest_to(position: [f64; 3], points: &Knn<'_, 3>) -> f64 {
-    let mut near = Vec::new();
-    points.nearest_to(position, 1, &mut near);
-    near.first().map_or(f64::INFINITY, |nearest| nearest.0.sqrt())
 }
 
 /// Returns doubts about released data whose rows or columns follow the places of the points, which no attack uses.
