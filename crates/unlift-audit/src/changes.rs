@@ -8,9 +8,9 @@ use unlift::obfuscate::{Change, Mitigation, Protection};
 use unlift_io::Error as FileError;
 use unlift_vision::network::DescriptorKind;
 
+use crate::document::distinct;
 use crate::images::{FeatureSource, Wanted, kind_of};
 use crate::maps::Prepared;
-use crate::request::distinct;
 use crate::{Error, bail};
 
 /// Returns the changes by mitigations of a map, which may be audited in tiles.

@@ -6,7 +6,6 @@ use unlift::neighbors::Needs;
 use unlift::recover::Delta;
 use unlift_report::{Document, RenderOptions};
 
-use crate::request::distinct;
 use crate::sources;
 
 /// What an attack gives, before gates.
@@ -96,6 +95,15 @@ pub fn options<const D: usize>(
     options
 }
 
+/// Returns the options of the user, and the names of schemes and thresholds, as recorded options.
+pub fn names(tried: &Tried, given: &Map<String, Value>) -> Map<String, Value> {
+    let mut options = given.clone();
+    options.insert("schemes".to_owned(), json!(tried.schemes));
+    let labels = tried.thresholds.iter().map(|t| t.label.as_str());
+    options.insert("thresholds".to_owned(), labels.collect());
+    options
+}
+
 /// Fields of a row that are unknown where points come from files.
 const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
 
@@ -136,4 +144,15 @@ pub fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Ve
         }
     }
     listed
+}
+
+/// Removes items that repeat an earlier one, because an audit has one row per combination.
+pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::with_capacity(items.len());
+    for item in items {
+        if !kept.iter().any(|earlier| same(earlier, &item)) {
+            kept.push(item);
+        }
+    }
+    kept
 }

@@ -15,7 +15,7 @@ use unlift::truth::{Original, Secret};
 use unlift::{PointSet, Unit};
 use unlift_report::document::Input;
 
-use crate::{Audit, Error};
+use crate::Error;
 
 /// Limits of delta, in multiples of the quartiles of the distance to the K-th neighbor; beyond them the attack did not learn the
 /// distance of neighbors. On RedKitchen and Castle delta is 0.1 (`density`) to 4.8 times (`consensus`, noise `near`) the median
@@ -28,6 +28,15 @@ const LONG: f64 = 0.05;
 
 /// Lists of at most this length are never long.
 const SHORT: usize = 5;
+
+/// What there is to say of the input of an audit.
+#[derive(Clone, Debug, Default)]
+pub struct Remarks {
+    /// Notes for readers of the figures; also reported as progress. Share-safe documents omit those that contain a path.
+    pub notes: Vec<String>,
+    /// Doubts about all figures: reported as notes, and no gate holds with one.
+    pub doubts: Vec<String>,
+}
 
 pub(crate) struct Doubts {
     pub(crate) of_rows: Vec<Option<String>>,
@@ -132,13 +141,13 @@ pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error>
     Err(error.advise("--scale 1 for a map in meters, or no --scale for relative lengths"))
 }
 
-/// Checks thresholds against the points, in the unit of the audit. Adds a note to `audit` if figures may be too large, and a doubt
+/// Checks thresholds against the points, in the unit of the audit. Adds a note to `remarks` if figures may be too large, and a doubt
 /// if they may be too small. Default thresholds in a relative unit always fit.
 ///
 /// # Errors
 /// If any guess would count as recovered, or no attack could come near.
 pub fn check_thresholds(
-    audit: &mut Audit,
+    remarks: &mut Remarks,
     points: &PointSet<3>,
     thresholds: &[Threshold],
     typed: bool,
@@ -179,11 +188,11 @@ pub fn check_thresholds(
         )));
     }
     if across > 0.0 && largest.value >= across {
-        audit.notes.push(format!(
+        remarks.notes.push(format!(
             "the map is {across_text} across, less than the threshold {largest_text}: within it any guess counts as recovered"
         ));
     } else if nearest >= UNUSUAL * largest.value {
-        audit.doubts.push(format!(
+        remarks.doubts.push(format!(
             "lengths are doubtful: points are {nearest_text} from their nearest neighbors, far more than the largest threshold, \
              {largest_text}: is {option} right?"
         ));
@@ -194,7 +203,6 @@ pub fn check_thresholds(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Output;
     use unlift::audit::{Silent, run};
     use unlift::recover::Builtin;
     use unlift::synthetic;
@@ -258,9 +266,9 @@ mod tests {
     ) -> Result<[Vec<String>; 2], String> {
         let points = PointSet::try_new(room(scale), unit).unwrap();
         let thresholds = labels.map(|label| Threshold::parse(label).unwrap());
-        let mut audit = Audit::new(Output::new("".as_ref()));
-        check_thresholds(&mut audit, &points, &thresholds, typed)
-            .map(|()| [audit.notes, audit.doubts])
+        let mut remarks = Remarks::default();
+        check_thresholds(&mut remarks, &points, &thresholds, typed)
+            .map(|()| [remarks.notes, remarks.doubts])
             .map_err(|error| error.to_string())
     }
 }

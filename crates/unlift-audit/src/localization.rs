@@ -44,7 +44,7 @@ pub(crate) fn localization(
     let open = |(path, nth): &(PathBuf, usize)| open(path, *nth, cameras, original, progress);
     let mut held = localize.held_out.as_ref().map(open).transpose()?;
     let note = held.as_ref().map(Held::note);
-    note.iter().for_each(|note| progress.say(&format!("note: {note}")));
+    note.iter().for_each(|note| progress.note(note));
     let steps = |done: usize, total: usize, scheme: &str| {
         progress.show(done, total, &format!("localization, {scheme}"));
     };
@@ -90,7 +90,7 @@ pub fn open<'a>(
     for found in images.par_iter().map(read).collect::<Vec<_>>() {
         match found {
             Ok(photo) => photos.push(photo?),
-            Err(error) => progress.say(&format!("note: not localized: {error}")),
+            Err(error) => progress.note(&format!("not localized: {error}")),
         }
     }
     photos.sort_by(|a, b| cameras.images[a.view].0.cmp(&cameras.images[b.view].0));

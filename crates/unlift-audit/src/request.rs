@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use unlift::audit::{NeighborsBy, Plan, Threshold};
+use unlift::neighbors::Source;
 use unlift::neighbors::oracle::Noise;
-use unlift::neighbors::{Needs, Source};
 use unlift::obfuscate::{Change, Changed, Scheme};
 use unlift::recover::Solver;
-use unlift::{Descriptors, ErrorKind, PointSet, Unit};
+use unlift::{Descriptors, PointSet, Unit};
 
-use crate::doubts::check_thresholds;
-use crate::{Audit, Error, bail, sources};
+use crate::document::distinct;
+use crate::doubts::{Remarks, check_thresholds};
+use crate::sources::check_fit;
+use crate::{Error, bail, sources};
 
 /// What a user requests of an attack.
 #[derive(Clone, Debug)]
@@ -103,8 +105,8 @@ impl Request<3> {
         Ok(())
     }
 
-    /// Returns the plan for a map whose release has `descriptors`; `place` says where they are expected. Adds to `audit` what there is
-    /// to say of it.
+    /// Returns the plan for a map whose release has `descriptors`; `place` says where they are expected. Adds to
+    /// `remarks` what there is to say of it.
     ///
     /// # Errors
     /// As of [`plan`](Self::plan), if a source does not support the descriptors, or if thresholds mean nothing for the map.
@@ -113,13 +115,13 @@ impl Request<3> {
         usual: Plan<3>,
         points: &PointSet<3>,
         (descriptors, place): (Option<&Descriptors>, &str),
-        audit: &mut Audit,
+        remarks: &mut Remarks,
     ) -> Result<Plan<3>, Error> {
         let typed = !self.plan.thresholds.is_empty();
         let plan = self.plan(usual, descriptors.is_some())?;
-        check_thresholds(audit, points, &plan.thresholds, typed)?;
+        check_thresholds(remarks, points, &plan.thresholds, typed)?;
         check_fit(&plan, descriptors, place)?;
-        audit.notes.extend(plan.own_sources().filter_map(|source| source.note(points.len())));
+        remarks.notes.extend(plan.own_sources().filter_map(|source| source.note(points.len())));
         Ok(plan)
     }
 }
@@ -127,34 +129,6 @@ impl Request<3> {
 /// Returns the index of the headline threshold of images in `thresholds`.
 pub fn headline(thresholds: &[Threshold]) -> usize {
     unlift_report::headline(thresholds.iter().map(|threshold| threshold.value))
-}
-
-/// Returns an error if a source of `plan` does not support the descriptors. `place` says where they are expected.
-pub fn check_fit<const D: usize>(
-    plan: &Plan<D>,
-    descriptors: Option<&Descriptors>,
-    place: &str,
-) -> Result<(), Error> {
-    for source in plan.own_sources() {
-        let wrong = |text: String| Error::request(format!("--neighbors {}: {text}", source.name()));
-        match descriptors.map(|descriptors| source.takes(descriptors)) {
-            None if source.needs() != Needs::Nothing => {
-                let expected = format!("expected descriptors {place}");
-                return Err(wrong(format!("{}, found none", expected.trim_end())));
-            }
-            None | Some(Ok(())) => {}
-            // Errors of another kind are about the source's model and name its path.
-            Some(Err(error)) if error.kind() != ErrorKind::Descriptors => {
-                return Err(wrong(error.to_string()));
-            }
-            Some(Err(error)) => {
-                let (expected, found) = (error.expected(), error.found());
-                let advice = "--neighbors similarity, which takes descriptors of any kind";
-                return Err(wrong(format!("expected {expected}, found {found}")).advise(advice));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Returns each source once. Different files, or different sources of the user with one name, are an error.
@@ -184,15 +158,4 @@ fn repeated<T>(items: &[T], same: impl Fn(&T, &T) -> bool) -> Option<&T> {
 
 fn given_or<T>(given: Vec<T>, usual: Vec<T>) -> Vec<T> {
     if given.is_empty() { usual } else { given }
-}
-
-/// Removes items that repeat an earlier one, because an audit has one row per combination.
-pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
-    let mut kept: Vec<T> = Vec::with_capacity(items.len());
-    for item in items {
-        if !kept.iter().any(|earlier| same(earlier, &item)) {
-            kept.push(item);
-        }
-    }
-    kept
 }

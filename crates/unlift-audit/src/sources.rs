@@ -3,11 +3,11 @@
 
 use std::sync::Arc;
 
-use unlift::audit::NeighborsBy;
+use unlift::audit::{NeighborsBy, Plan};
 use unlift::neighbors::sources::{self, Named, SourceEntry};
 use unlift::neighbors::{KeptPairs, Needs, Neighborhoods, Overlap, Similarity, Source};
 use unlift::released::Released;
-use unlift::{Descriptors, Error, RecordId};
+use unlift::{Descriptors, Error, ErrorKind, RecordId};
 
 /// The source `descriptors`: the best one for the given descriptors.
 pub(crate) const BY_DESCRIPTORS: SourceEntry = SourceEntry {
@@ -118,6 +118,35 @@ impl<const D: usize> Source<D> for ByDescriptors {
     fn note(&self, n_slots: usize) -> Option<String> {
         Source::<D>::note(&Overlap, n_slots)
     }
+}
+
+/// Returns an error if a source of `plan` does not support the descriptors. `place` says where they are expected.
+pub fn check_fit<const D: usize>(
+    plan: &Plan<D>,
+    descriptors: Option<&Descriptors>,
+    place: &str,
+) -> Result<(), crate::Error> {
+    for source in plan.own_sources() {
+        let wrong =
+            |text: String| crate::Error::request(format!("--neighbors {}: {text}", source.name()));
+        match descriptors.map(|descriptors| source.takes(descriptors)) {
+            None if source.needs() != Needs::Nothing => {
+                let expected = format!("expected descriptors {place}");
+                return Err(wrong(format!("{}, found none", expected.trim_end())));
+            }
+            None | Some(Ok(())) => {}
+            // Errors of another kind are about the source's model and name its path.
+            Some(Err(error)) if error.kind() != ErrorKind::Descriptors => {
+                return Err(wrong(error.to_string()));
+            }
+            Some(Err(error)) => {
+                let (expected, found) = (error.expected(), error.found());
+                let advice = "--neighbors similarity, which takes descriptors of any kind";
+                return Err(wrong(format!("expected {expected}, found {found}")).advise(advice));
+            }
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

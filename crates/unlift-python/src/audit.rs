@@ -135,7 +135,7 @@ pub fn audit(
         let usual = Plan::new(unit).for_map(n_together, request.plan.k);
         let mut audit = Audit { about, gates, ..Audit::new(output).of_map(&prepared) };
         let (points, descriptors) = (prepared.original.reveal(), prepared.descriptors.as_ref());
-        let plan = request.of_map(usual, points, (descriptors, ""), &mut audit)?;
+        let plan = request.of_map(usual, points, (descriptors, ""), &mut audit.remarks)?;
         let map = MapInput { plan, localize: None, ..MapInput::new(&prepared) };
         let input = match tiles {
             Some(tiles) => Input::Tiles(map, tiles),

@@ -66,7 +66,7 @@ impl Map {
             let sha256 = Some(hash_positions(&rows));
             let mut prepared = prepare(rows, given.as_ref(), &preparation)?;
             let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
-            prepared.notes.extend(zeros);
+            prepared.remarks.notes.extend(zeros);
             let about = Input {
                 sha256,
                 n_points: prepared.original.len() as u64,
@@ -118,7 +118,7 @@ impl Map {
     /// Notes on reading and preparation; a report has them, too.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.prepared.doubts.iter().chain(&self.prepared.notes).cloned().collect()
+        self.prepared.remarks.doubts.iter().chain(&self.prepared.remarks.notes).cloned().collect()
     }
 
     /// Indices of the points that are left, ascending `(n,)`.

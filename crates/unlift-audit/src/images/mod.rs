@@ -1,6 +1,5 @@
 //! Features of images from a folder of photos, an HDF5 file of hloc, a COLMAP database, or memory.
 
-mod folder;
 pub mod stream;
 
 use std::num::NonZeroUsize;
@@ -10,14 +9,14 @@ use unlift::Descriptors;
 use unlift::audit::Plan;
 use unlift::descriptors::Values;
 use unlift::neighbors::Needs;
-use unlift_io::features::{self, ImageFeatures};
+use unlift_io::features::{self, ImageFeatures, Photos, round_to_half};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, Input};
 use unlift_vision::features::photo::Turn;
-use unlift_vision::features::{Extraction, Extractor};
+use unlift_vision::features::{Extraction, Extractor, Photo};
 use unlift_vision::network::DescriptorKind;
 
-use crate::request::check_fit;
+use crate::sources::check_fit;
 use crate::{Error, bail, sources};
 
 type Get = Box<dyn Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync>;
@@ -53,7 +52,7 @@ impl FeatureSource {
     pub fn open(path: &Path, extraction: &Extraction) -> Result<Self, Error> {
         let metadata = std::fs::metadata(path).map_err(|e| unlift_io::Error::read(path, e))?;
         if metadata.is_dir() {
-            return folder::open(path, extraction);
+            return Self::open_folder(path, extraction);
         }
         let file = features::FeatureSource::open(path)?;
         Ok(Self {
@@ -63,6 +62,32 @@ impl FeatureSource {
             turn: if file.is_upright() { Turn::Upright } else { Turn::AsStored },
             from: Origin::File(file),
         })
+    }
+
+    /// Opens the photos in `root` and its subfolders.
+    fn open_folder(root: &Path, extraction: &Extraction) -> Result<Self, Error> {
+        let extractor = Extractor::try_new(extraction)?;
+        let mut listing = Photos::list(root);
+        // "12 .heic, 1 .tiff".
+        let others = listing.others.iter().map(|(ending, n)| format!("{n} .{ending}"));
+        let others = others.collect::<Vec<_>>().join(", ");
+        if listing.photos.is_empty() {
+            return Err(match listing.refused.pop() {
+                Some(refused) => refused,
+                None => {
+                    let found = if others.is_empty() { "none" } else { &format!("only {others}") };
+                    unlift_io::Error::new(root, "", "JPEG, PNG or WebP photos", found)
+                }
+            }
+            .into());
+        }
+        let root = root.display();
+        let passed_over = format!("{root}: passed over {others}: only JPEG, PNG and WebP are read");
+        let passed_over = (!others.is_empty()).then_some(passed_over);
+        let (names, paths) = listing.photos.into_iter().unzip();
+        let from = Origin::Photos { paths, extractor, kind: extraction.kind };
+        let refused = listing.refused.iter().map(ToString::to_string).collect();
+        Ok(Self { names, refused, passed_over, turn: Turn::Upright, from })
     }
 
     /// Creates a source of the images `names` in memory. `get` returns the features of the image with an index in `names`, from any
@@ -122,7 +147,7 @@ impl FeatureSource {
                 name,
                 upright: self.turn == Turn::Upright,
                 photo: Some(paths[at].clone()),
-                ..folder::features_of(extractor.read(&paths[at])?)
+                ..features_of(extractor.read(&paths[at])?)
             },
             Origin::File(file) => file.get(at)?,
             Origin::Memory(get) => ImageFeatures { name, ..get(at)? },
@@ -143,6 +168,24 @@ impl FeatureSource {
             Origin::Photos { kind, .. } => Ok(*kind),
             _ => kind_of(option, self.first(chosen).and_then(|first| first.descriptors).as_ref()),
         }
+    }
+}
+
+/// Converts extracted features to those of files.
+fn features_of(mut photo: Photo) -> ImageFeatures {
+    if let Values::F32(values) = &mut photo.descriptors {
+        round_to_half(values);
+    }
+    ImageFeatures {
+        keypoints: photo.keypoints.into_iter().map(|place| place.map(f64::from)).collect(),
+        orientations_deg: photo.orientations_deg,
+        scores: Some(photo.scores),
+        scales: photo.scales,
+        // Descriptors that are all equal are rejected; such an image has none.
+        descriptors: Descriptors::try_new(photo.descriptors, photo.dim).ok(),
+        size: Some(photo.size.map(|side| side as u32)),
+        uncertainty_px: Some(photo.noise_px),
+        ..ImageFeatures::default()
     }
 }
 

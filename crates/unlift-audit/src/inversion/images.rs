@@ -12,7 +12,7 @@ use unlift_vision::pictures::{Gallery, Painter, Picture, Points, Reference, need
 
 use crate::images::{FeatureSource, evenly};
 
-use super::{add_to, lock};
+use super::sheet::{add_to, lock};
 
 /// A photo and the picture of its true points: no attack on positions can be expected to do better.
 type Truth = (Reference, Picture);

@@ -16,7 +16,7 @@ use unlift_report::scene::{SceneBox, Shapes};
 use unlift_vision::features::photo::{Turn, read_color};
 use unlift_vision::pictures::{Gallery, Lens, Painter, Picture, Reference, View, needed};
 
-use super::{add_to, lock};
+use super::sheet::{add_to, lock};
 use crate::Progress;
 use crate::images::{evenly, kind_of};
 use crate::maps::Prepared;
@@ -80,13 +80,13 @@ impl MapInversion {
         let n = with_photo.len();
         if n < images.len() {
             let found = format!("{n} of {} images of the model have a photo", images.len());
-            progress.say(&format!("note: {}: {found}", photos.display()));
+            progress.note(&format!("{}: {found}", photos.display()));
         }
         let mut views = Vec::new();
         for (image, path) in evenly(n, Some(max_images)).into_iter().map(|at| &with_photo[at]) {
             match open_photo(&painter, (&cameras, image), path, scale) {
                 Ok(view) => views.push(view),
-                Err(error) => progress.say(&format!("note: not painted: {error}")),
+                Err(error) => progress.note(&format!("not painted: {error}")),
             }
         }
         if views.is_empty() {

@@ -20,7 +20,7 @@ use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
 use crate::bail;
-use crate::doubts::{check_scale, with_sides};
+use crate::doubts::{Remarks, check_scale, with_sides};
 
 /// Options for the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,10 +62,8 @@ pub struct Prepared {
     pub rows: Vec<u32>,
     /// The cameras that observe the points, if the file has them.
     pub cameras: Cameras,
-    /// Notes for readers of the figures. Share-safe documents omit those that contain a path.
-    pub notes: Vec<String>,
-    /// Doubts about all figures. No gate holds with one.
-    pub doubts: Vec<String>,
+    /// Notes and doubts about the points, and about what was read with them.
+    pub remarks: Remarks,
     /// The map as it was read; empty for points in memory.
     pub input: read::Input,
 }
@@ -74,7 +72,7 @@ impl Prepared {
     /// Takes points that are in the unit of the audit, without descriptors and cameras.
     pub fn of(original: Original<3>) -> Self {
         let rows = (0..original.len() as u32).collect();
-        let (descriptors, descriptors_file, cameras, notes, doubts, input) = Default::default();
+        let (descriptors, descriptors_file, cameras, remarks, input) = Default::default();
         Self {
             original: Arc::new(original),
             descriptors,
@@ -82,8 +80,7 @@ impl Prepared {
             unit_in_map_units: 1.0,
             rows,
             cameras,
-            notes,
-            doubts,
+            remarks,
             input,
         }
     }
@@ -140,17 +137,17 @@ pub fn open(
         if is_other { error.advise(way_out) } else { error }
     })?;
     check_scale(&input.positions, preparation.scale)?;
-    let (mut notes, mut doubts) = (input.notes.clone(), input.doubts.clone());
+    let mut remarks = Remarks { notes: input.notes.clone(), doubts: input.doubts.clone() };
     let mut described = None;
     if let Some(file) = descriptors {
         described = Some((read::descriptors(file, &input)?, file.to_owned()));
     } else if preparation.beside {
         match beside(&input) {
             Ok((rows, file)) => {
-                notes.push(format!("descriptors: {}, beside the model", file.display()));
+                remarks.notes.push(format!("descriptors: {}, beside the model", file.display()));
                 described = Some((rows, file));
             }
-            Err(reasons) => doubts.extend(reasons),
+            Err(reasons) => remarks.doubts.extend(reasons),
         }
     }
     let (rows, file) = described.unzip();
@@ -159,27 +156,24 @@ pub fn open(
         let error = crate::Error::from(unlift_io::Error::core(path, error));
         if few { error.advise("a smaller --k, or more points") } else { error }
     })?;
+    remarks.doubts.append(&mut prepared.remarks.doubts);
     // `prepared.rows` counts the points with a place only.
     prepared.rows = rows_of_file(&prepared.rows, &input.left_out);
     if let Some(model) = &input.model {
         match Cameras::read(model, &prepared.rows, 1.0 / prepared.unit_in_map_units) {
             Ok(cameras) => {
-                prepared.notes.extend(cameras.note());
+                remarks.notes.extend(cameras.note());
                 prepared.cameras = cameras;
             }
             // An audit of points needs no cameras.
-            Err(error) => prepared.notes.push(format!("localization: not measured: {error}")),
+            Err(error) => remarks.notes.push(format!("localization: not measured: {error}")),
         }
     }
-    prepared.doubts.splice(0..0, doubts);
     if let Some(rows) = &prepared.descriptors {
-        prepared.notes.extend(zeros(rows));
-        prepared.doubts.extend(unlike_neighbors(prepared.original.reveal(), rows)?);
+        remarks.notes.extend(zeros(rows));
+        remarks.doubts.extend(unlike_neighbors(prepared.original.reveal(), rows)?);
     }
-    prepared.notes.splice(0..0, notes);
-    prepared.descriptors_file = file;
-    prepared.input = input;
-    Ok(prepared)
+    Ok(Prepared { remarks, descriptors_file: file, input, ..prepared })
 }
 
 /// Reads the first file beside the model of `input` that has the descriptors of its points; returns why none of them has.
@@ -265,7 +259,8 @@ pub fn prepare<'a>(
     let points = if factor == 1.0 { points } else { points.scaled(factor, unit)? };
     let descriptors = descriptors.map(|all| all.select(&rows));
     let prepared = Prepared::of(Original::new(points));
-    Ok(Prepared { descriptors, unit_in_map_units, rows, doubts, ..prepared })
+    let remarks = Remarks { doubts, ..Remarks::default() };
+    Ok(Prepared { descriptors, unit_in_map_units, rows, remarks, ..prepared })
 }
 
 /// Reads lists by row of the file and keeps those of the prepared rows.
@@ -294,8 +289,8 @@ pub fn by_point(path: &Path, prepared: &mut Prepared) -> Result<PointNeighbors, 
         offsets.push(neighbors.len() as u64);
     }
     let (notes, doubts) = doubts(&offsets, &neighbors, prepared);
-    prepared.notes.extend(notes);
-    prepared.doubts.extend(doubts);
+    prepared.remarks.notes.extend(notes);
+    prepared.remarks.doubts.extend(doubts);
     // The hashes identify the file; a file called oracle must not appear as the source `oracle`.
     let name = "file".to_owned();
     Ok(PointNeighbors { name, offsets, neighbors, scores })

@@ -66,15 +66,15 @@ impl Files<'_> {
         expect_slots(self.released, &released, &secret)?;
         let released = self.described(released, &secret)?;
         let secret = secret.with_map(Some(released.fingerprint()));
-        let notes = released.descriptors().and_then(zeros).into_iter().collect();
-        let mut prepared = Prepared { notes, ..Prepared::of(original) };
+        let mut prepared = Prepared::of(original);
+        prepared.remarks.notes.extend(released.descriptors().and_then(zeros));
         let row = |slot: Option<usize>| Some(secret.descriptor_row()[slot?]);
         // Without the descriptors of all points, other schemes have none.
         let order: Option<Vec<u32>> = slot_of(&secret).into_iter().map(row).collect();
         if let (Some(rows), Some(order)) = (released.descriptors(), order) {
             let points = prepared.original.reveal();
             let rows = rows.select(&order);
-            prepared.doubts.extend(unlike_neighbors(points, &rows)?);
+            prepared.remarks.doubts.extend(unlike_neighbors(points, &rows)?);
             // Other schemes would release the plain descriptors, which are not known here.
             prepared.descriptors = released.protected().is_none().then_some(rows);
         }

@@ -26,8 +26,7 @@ pub struct AuditArgs {
     /// of the median distance to the K-th nearest neighbor]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
     pub thresholds: Vec<Threshold>,
-    /// Fail with exit code 1 if an attack recovers more than this; repeatable. Syntax: see Gates in
-    /// unlift audit map --help
+    /// Fail with exit code 1 if an attack recovers more than this; repeatable. Syntax: see Gates in unlift audit map --help
     #[arg(long, value_name = "GATE", value_parser = Gate::parse)]
     pub gate: Vec<Gate>,
     /// Also write the results of the gates as JUnit XML, for GitHub, GitLab, Jenkins and others
@@ -57,8 +56,7 @@ pub struct OracleArgs {
     pub inlier_ratios: Vec<f64>,
     /// Wrong entries of the oracle's lists, separated by commas or repeated: uniform (random
     /// records), near (random records between the (2 x K)-th and the (10 x K)-th nearest),
-    /// clustered (nearby points share the same few wrong places, as happens where descriptors look
-    /// alike) [default: uniform]
+    /// clustered (nearby points share the same few wrong places, as happens where descriptors look alike) [default: uniform]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::by(Noise::from_name))]
     pub oracle_noise: Vec<Noise>,
     /// Average the results over N random seeds
@@ -74,21 +72,18 @@ pub struct SolverArgs {
     /// from the original points, with a chosen fraction of true neighbors. The others make lists
     /// from the released map: descriptors (the best one for the descriptors), similarity (any
     /// descriptors), overlap (SIFT), learned (a network, for SIFT or ALIKED), geometric (places
-    /// where many records meet; no descriptors). FILE has a list of neighbors per original point
-    /// (docs/formats.md)
+    /// where many records meet; no descriptors). FILE has a list of neighbors per original point (docs/formats.md)
     /// [default: descriptors, if there are any, and oracle]
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source)]
     pub neighbors: Vec<NeighborSource>,
     /// Recovery methods, separated by commas or repeated. With lists of neighbors: joint (the
     /// strongest), consensus (each point from its own list), ransac (the attack of Chelani et al.
     /// 2025). Without lists, from the records alone (what a scheme releases in place of points):
-    /// density (published attacks), tomography (stronger) [default: joint; also consensus if the
-    /// map has fewer than 150 x K points]
+    /// density (published attacks), tomography (stronger) [default: joint; also consensus if the map has fewer than 150 x K points]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver)]
     pub solver: Vec<Builtin>,
     /// Skip the baseline "records alone", the best attack that uses only the records, without
-    /// descriptors; it may make lists from them. It often takes most of the time. Without the
-    /// baseline, figures may be too low
+    /// descriptors; it may make lists from them. It often takes most of the time. Without the baseline, figures may be too low
     #[arg(long)]
     pub no_records_alone: bool,
 }
@@ -100,8 +95,7 @@ pub struct ProtectArgs {
     /// Also audit every scheme with protected descriptors; repeatable. subspace:2 releases a plane
     /// through each descriptor (CVPR 2021), with half of its directions towards public descriptors;
     /// also subspace:4:random or :adversarial. ldp:256,2,8 releases 2 of 256 public words, which
-    /// contain the nearest one with a probability for epsilon = 8 (ICCV 2023). Sources read what
-    /// an attacker infers
+    /// contain the nearest one with a probability for epsilon = 8 (ICCV 2023). Sources read what an attacker infers
     #[arg(long, value_name = "RULE", value_parser = values::by(Protection::parse))]
     pub protect_descriptors: Vec<Protection>,
     /// Folder of photos, or file of features, whose descriptors owner and attacker know: the
@@ -130,13 +124,11 @@ pub fn public_name(path: Option<&Path>) -> &'static str {
 pub struct PaintArgs {
     /// Paint pictures from the recovered points, and compare them with the photos by SSIM, PSNR and
     /// LPIPS. For a map, needs --photos and a COLMAP model with descriptors. --invert=FILE paints
-    /// with your own network (ONNX), as the scripts in the repository's folder training/inversion
-    /// write it
+    /// with your own network (ONNX), as the scripts in the repository's folder training/inversion write it
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     pub invert: Option<Option<PathBuf>>,
     /// Folder of the photos, if PATH is a map or a file. unlift applies the EXIF orientation of the
-    /// photos only if PATH states that its keypoints refer to upright photos, as the output of
-    /// unlift features does without --as-stored
+    /// photos only if PATH states that its keypoints refer to upright photos, as the output of unlift features does without --as-stored
     #[arg(long, value_name = "DIR")]
     pub photos: Option<PathBuf>,
 }
@@ -152,8 +144,7 @@ impl PaintArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
 pub struct ExtractionArgs {
-    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
-    /// unlift models) [default: sift]
+    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see unlift models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::by(DescriptorKind::from_name))]
     pub features: Option<DescriptorKind>,
     /// Number of features per photo. aliked and superpoint keep the N best. sift keeps whole
@@ -231,8 +222,7 @@ pub struct AuditMapArgs {
           help_heading = "Input")]
     pub expect_extent: Option<(f64, f64)>,
     /// Run a small audit: the schemes olc (a random line through each point) and ppl (one line
-    /// through two points), with the oracle at inlier ratio 0.5 and, if there are descriptors, the
-    /// source similarity
+    /// through two points), with the oracle at inlier ratio 0.5 and, if there are descriptors, the source similarity
     #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
     pub quick: bool,
     /// Run a large audit, as the paper's tables need it: the oracle at the inlier ratios
@@ -257,8 +247,7 @@ pub struct AuditMapArgs {
     #[command(flatten)]
     pub protect: ProtectArgs,
     /// Cut a large map into tiles of at most N points and audit each tile as a separate map. This
-    /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond
-    /// a few million points
+    /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond a few million points
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Attack",
           conflicts_with_all = ["invert", "localize"])]
     pub tile_points: Option<NonZeroUsize>,
@@ -296,8 +285,7 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "K", default_value = "20", help_heading = "Input",
           value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
-    /// Schemes to audit, separated by commas (unlift schemes lists them) [default:
-    /// lines2d,cp2d,dcl2d]
+    /// Schemes to audit, separated by commas (unlift schemes lists them) [default: lines2d,cp2d,dcl2d]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
@@ -306,8 +294,7 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
-    /// Recovery methods, separated by commas or repeated: joint, consensus or ransac (see unlift
-    /// audit map) [default: joint]
+    /// Recovery methods, separated by commas or repeated: joint, consensus or ransac (see unlift audit map) [default: joint]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
@@ -333,8 +320,7 @@ pub struct AuditSequenceArgs {
     /// Meters per unit of MODEL, for --poses
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale, help_heading = "Input")]
     pub scale: Option<f64>,
-    /// Schemes to audit, separated by commas (unlift schemes lists them) [default:
-    /// lines2d,cp2d,dcl2d]
+    /// Schemes to audit, separated by commas (unlift schemes lists them) [default: lines2d,cp2d,dcl2d]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
@@ -383,8 +369,7 @@ pub struct AuditAgainArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme_pair,
           help_heading = "Attack")]
     pub schemes: Vec<[&'static Entry; 2]>,
-    /// Skip the baseline "records alone", the best attack on the first release only, without
-    /// descriptors. It takes most of the time
+    /// Skip the baseline "records alone", the best attack on the first release only, without descriptors. It takes most of the time
     #[arg(long, help_heading = "Attack")]
     pub no_records_alone: bool,
     #[command(flatten)]
@@ -399,8 +384,7 @@ pub struct AuditReleasedArgs {
     /// A file with the original points and, for each, the record that hides it
     #[arg(long, value_name = "TRUTH", help_heading = "Input")]
     pub truth: PathBuf,
-    /// Name of the scheme in the results [default: the value of "scheme" in RELEASED, otherwise
-    /// "released"]
+    /// Name of the scheme in the results [default: the value of "scheme" in RELEASED, otherwise "released"]
     #[arg(long, value_name = "NAME", value_parser = unlift_audit::released::check_name, help_heading = "Input")]
     pub name: Option<String>,
     /// Descriptors of the original points, if RELEASED has none: a .npy array with a row per point,

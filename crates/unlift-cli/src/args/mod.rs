@@ -45,8 +45,7 @@ impl Cli {
     }
 }
 
-/// Accepts negative numbers as values, so that the error of `--scale -1` is about the value -1, not
-/// about an option `-1`.
+/// Accepts negative numbers as values, so that the error of `--scale -1` is about the value -1, not about an option `-1`.
 fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
     let forgiving = |arg: clap::Arg| match arg.get_action().takes_values() && !arg.is_positional() {
         true => arg.allow_negative_numbers(true),

@@ -29,8 +29,7 @@ pub struct DemoArgs {
 #[derive(Debug, Args)]
 #[command(after_help = include_str!("help/obfuscate.txt").trim_end())]
 pub struct ObfuscateArgs {
-    /// A map, any PATH of unlift audit map. Or images: a folder of photos, hloc's features.h5, or a
-    /// COLMAP database.db
+    /// A map, any PATH of unlift audit map. Or images: a folder of photos, hloc's features.h5, or a COLMAP database.db
     pub path: PathBuf,
     /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
     #[arg(long = "schemes", alias = "scheme", value_name = "SCHEME",
@@ -48,8 +47,7 @@ pub struct ObfuscateArgs {
     /// Release protected descriptors, as unlift audit map --protect-descriptors audits them
     #[arg(long, value_name = "RULE", value_parser = values::by(Protection::parse))]
     pub protect_descriptors: Option<Protection>,
-    /// The descriptors that owner and users know, as for unlift audit map [default: the two photos
-    /// of unlift demo]
+    /// The descriptors that owner and users know, as for unlift audit map [default: the two photos of unlift demo]
     #[arg(long, value_name = "PATH", requires = "protect_descriptors")]
     pub public_descriptors: Option<PathBuf>,
     /// The audit.json of unlift audit map on this map: print what its attacks recover under this
@@ -72,16 +70,14 @@ pub struct NeighborsArgs {
     /// For the oracle: the truth.npz that belongs to RELEASED
     #[arg(long, value_name = "TRUTH", requires = "inlier_ratio")]
     pub truth: Option<PathBuf>,
-    /// For the oracle: fraction of each list that consists of true nearest neighbors, from 0 to 1:
-    /// round(RATIO x K) of K entries
+    /// For the oracle: fraction of each list that consists of true nearest neighbors, from 0 to 1: round(RATIO x K) of K entries
     #[arg(long = "inlier-ratios", alias = "inlier-ratio", value_name = "RATIO",
           value_parser = values::ratio, requires = "truth")]
     pub inlier_ratio: Option<f64>,
     /// For the oracle: wrong entries of the lists, uniform, near or clustered (see unlift audit map)
     #[arg(long, value_name = "MODEL", value_parser = values::by(Noise::from_name), default_value = "uniform")]
     pub oracle_noise: Noise,
-    /// Number of records per list; there is a list per hidden point [default: 50 for the oracle,
-    /// otherwise chosen by the source]
+    /// Number of records per list; there is a list per hidden point [default: 50 for the oracle, otherwise chosen by the source]
     #[arg(long, value_name = "K", value_parser = value_parser!(u16).range(1..))]
     pub k: Option<u16>,
     /// Random seed
@@ -143,8 +139,7 @@ pub struct ExportArgs {
     /// coordinates of the map [default: coordinates as in FILE]
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
     pub scale: Option<f64>,
-    /// A COLMAP model or project of the same map. Its cameras and images are copied to the exported
-    /// model
+    /// A COLMAP model or project of the same map. Its cameras and images are copied to the exported model
     #[arg(long, value_name = "PROJECT")]
     pub cameras: Option<PathBuf>,
 }
@@ -159,12 +154,10 @@ pub struct FeaturesArgs {
     pub out: PathBuf,
     #[command(flatten)]
     pub extraction: ExtractionArgs,
-    /// Leave photos as they are stored, as COLMAP and hloc do. Without this option, photos are
-    /// turned upright by their EXIF orientation
+    /// Leave photos as they are stored, as COLMAP and hloc do. Without this option, photos are turned upright by their EXIF orientation
     #[arg(long)]
     pub as_stored: bool,
-    /// Shrink photos whose longer side exceeds PIXELS; keypoints stay in pixels of the original
-    /// photo [default: sift 3200, others 1600]
+    /// Shrink photos whose longer side exceeds PIXELS; keypoints stay in pixels of the original photo [default: sift 3200, others 1600]
     #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(16..=65536))]
     pub max_image_size: Option<u32>,
     /// Show no progress on stderr
@@ -175,14 +168,12 @@ pub struct FeaturesArgs {
 #[derive(Debug, Args)]
 #[command(after_help = include_str!("help/invert.txt").trim_end())]
 pub struct InvertArgs {
-    /// A folder of photos, hloc's features.h5, a COLMAP database.db, or the released.npz of a map
-    /// or of images
+    /// A folder of photos, hloc's features.h5, a COLMAP database.db, or the released.npz of a map or of images
     pub path: PathBuf,
     /// Output file of unlift recover for PATH; required if PATH is a released.npz. Without it,
     /// unlift paints six views from the center of a sphere cloud
     pub recovered: Option<PathBuf>,
-    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see
-    /// unlift models) [default: sift]
+    /// Features to extract from photos: sift, aliked, or superpoint, whose weights you supply (see unlift models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::by(DescriptorKind::from_name))]
     pub features: Option<DescriptorKind>,
     /// COLMAP model with the cameras from which to paint the map; only if PATH is a released map
@@ -191,8 +182,7 @@ pub struct InvertArgs {
     /// The --scale given to unlift obfuscate: units of the released map per unit of MODEL
     #[arg(long, value_name = "SCALE", value_parser = values::positive, requires = "cameras")]
     pub scale: Option<f64>,
-    /// Paint at most N images: evenly spaced by name or, if PATH is a released.npz of images, the
-    /// first N
+    /// Paint at most N images: evenly spaced by name or, if PATH is a released.npz of images, the first N
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_images: Option<NonZeroUsize>,
     /// Folder for the pictures

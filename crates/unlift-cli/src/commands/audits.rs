@@ -138,7 +138,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
                 public(args.protect.public_descriptors.as_deref(), kind)
             })?;
         if args.solvers.no_records_alone {
-            prepared.notes.push(NO_RECORDS_ALONE.to_owned());
+            prepared.remarks.notes.push(NO_RECORDS_ALONE.to_owned());
         }
         let (unit, n_points) = (prepared.original.reveal().unit(), prepared.original.len());
         let n_together = args.tile_points.map_or(n_points, |max| n_points.min(max.get()));
@@ -158,7 +158,7 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
         let mut audit = audit.of_map(&prepared);
         let descriptors = (prepared.descriptors.as_ref(), "(--descriptors FILE)");
         let points = prepared.original.reveal();
-        let mut plan = request.of_map(usual, points, descriptors, &mut audit)?;
+        let mut plan = request.of_map(usual, points, descriptors, &mut audit.remarks)?;
         if let Some(inversion) = &inversion {
             let attacks = match has_ratios {
                 true => plan.rows_per_scheme(),
@@ -214,7 +214,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let mut audit = audit.of_map(&prepared);
         let descriptors = (hidden.0.descriptors(), "in the released map");
         let points = prepared.original.reveal();
-        let plan = request.of_map(usual, points, descriptors, &mut audit)?;
+        let plan = request.of_map(usual, points, descriptors, &mut audit.remarks)?;
         let map = Map { plan, ..Map::new(&prepared) };
         let published = published_positions(&args.released)?;
         let input = Input::Released(map, Hidden { release: &hidden, published });
@@ -331,7 +331,7 @@ pub fn again(args: &AuditAgainArgs) -> crate::Result<bool> {
         request.plan.records_alone = !args.no_records_alone;
         let plan = request.plan(usual, false)?;
         let mut audit = audit.of_map(&maps.first);
-        check_thresholds(&mut audit, points, &plan.thresholds, typed)?;
+        check_thresholds(&mut audit.remarks, points, &plan.thresholds, typed)?;
         let options = SchemeOptions::usual(points.unit());
         let pairs = match args.schemes.as_slice() {
             [] => SCHEMES.iter().map(|entry| [entry; 2]).collect(),

@@ -103,7 +103,7 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
         return obfuscate_images(args, out);
     };
     let prepared = open_map(&args.path, map, false, (args.seed.unwrap_or(0), false))?;
-    prepared.doubts.iter().chain(&prepared.notes).for_each(stderr::note);
+    prepared.remarks.doubts.iter().chain(&prepared.remarks.notes).for_each(stderr::note);
     let scheme = changed(args, scheme, &prepared)?;
     let name = scheme.name();
     let leak = match &args.audit {

@@ -18,6 +18,18 @@ const CRATES: &[(&str, &[&str])] = &[
     ("unlift-cli", &["unlift", "unlift-audit", "unlift-io", "unlift-vision", "unlift-report"]),
 ];
 
+/// Modules of the report and of the audit, from the bottom up: each imports only itself and modules before it.
+const MODULES: &[(&str, &str)] = &[
+    (
+        "unlift-report",
+        "words document attack results templates table gates page export compare release",
+    ),
+    (
+        "unlift-audit",
+        "error sources doubts document gate request maps images changes inversion localization audit",
+    ),
+];
+
 /// External dependencies allowed for the two core crates.
 const DEPENDENCIES: &[&str] =
     &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom", "serde", "indexmap"];
@@ -64,6 +76,29 @@ fn crates_depend_downward_alone() {
             let is_core = ["unlift-attack", "unlift"].contains(&name);
             let heavy = is_core && !house && !DEPENDENCIES.contains(&dependency);
             assert!(!heavy, "{name} has a new dependency: {dependency}");
+        }
+    }
+}
+
+#[test]
+fn modules_import_downward_alone() {
+    for &(name, modules) in MODULES {
+        let place = |module: &str| modules.split(' ').position(|known| known == module);
+        let root = Path::new(CORE).join("..").join(name).join("src");
+        for (path, text) in sources(name, "src") {
+            let first = path.strip_prefix(&root).unwrap().iter().next().unwrap();
+            let module = Path::new(first).file_stem().unwrap().to_str().unwrap();
+            let lines = code(&text).filter(|line| module != "lib" && !line.contains("//"));
+            for import in lines.flat_map(|line| line.split("crate::").skip(1)) {
+                let end = |c: char| !c.is_alphanumeric() && c != '_';
+                let list = import.strip_prefix('{').and_then(|list| list.split('}').next());
+                let imported = list.unwrap_or(import.split(end).next().unwrap()).split(", ");
+                for imported in imported.filter_map(|path| path.split("::").next()) {
+                    let is_below = place(imported).is_some_and(|at| Some(at) <= place(module));
+                    let is_ours = is_below || ["Error", "Progress", "bail"].contains(&imported);
+                    assert!(is_ours, "{}: {imported}", path.display());
+                }
+            }
         }
     }
 }

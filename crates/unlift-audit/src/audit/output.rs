@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Map as Options, Value};
+use unlift::OneLine;
 use unlift::audit::{Plan, Seconds};
-use unlift::{OneLine, PointSet};
 use unlift_io::atomic::{Access, OutputFile, make_folders, write_file};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
 use unlift_report::document as report;
@@ -14,11 +14,11 @@ use unlift_report::{
     Document, Opening, RenderOptions, Shares, gate_lines, render, shares, text_table,
 };
 
-use crate::document::{Attacked, Tried, not_audited};
-use crate::gate::{Gate, check_gates, gate_result};
+use crate::document::{Attacked, distinct, not_audited};
+use crate::doubts::Remarks;
+use crate::gate::{Gate, gate_result};
 use crate::maps::Prepared;
-use crate::request::distinct;
-use crate::{Error, Progress, bail};
+use crate::{Error, bail};
 
 /// An audit of any input: what there is to say of it, the gates, and where the results go.
 #[derive(Clone, Debug)]
@@ -27,10 +27,8 @@ pub struct Audit {
     pub about: report::Input,
     /// Recorded options, in addition to those of the plan.
     pub options: Options<String, Value>,
-    /// Notes for readers of the figures; also reported as progress.
-    pub notes: Vec<String>,
-    /// Doubts about all figures: reported as notes, and no gate holds with one.
-    pub doubts: Vec<String>,
+    /// Notes and doubts about the input.
+    pub remarks: Remarks,
     /// The gates.
     pub gates: Vec<Gate>,
     /// The output.
@@ -40,32 +38,19 @@ pub struct Audit {
 impl Audit {
     /// Creates an audit without gates, notes and further options.
     pub fn new(output: Output) -> Self {
-        let (about, options, notes, doubts, gates) = Default::default();
-        Self { about, options, notes, doubts, gates, output }
+        let (about, options, remarks, gates) = Default::default();
+        Self { about, options, remarks, gates, output }
     }
 
-    /// Sets the input to `prepared` points, with their notes and doubts.
+    /// Sets the input to `prepared` points, with what there is to say of them.
     #[must_use]
     pub fn of_map(self, prepared: &Prepared) -> Self {
         let about = report::Input { n_points: prepared.original.len() as u64, ..self.about };
-        Self { about, notes: prepared.notes.clone(), doubts: prepared.doubts.clone(), ..self }
-    }
-
-    /// Checks the gates before the attack, and reports `notes`. `points` are those of a map.
-    pub(crate) fn begin<'n>(
-        &self,
-        tried: &Tried,
-        points: Option<&PointSet<3>>,
-        notes: impl IntoIterator<Item = &'n String>,
-        progress: &dyn Progress,
-    ) -> Result<(), Error> {
-        check_gates(&self.gates, tried, points)?;
-        notes.into_iter().for_each(|note| progress.say(&format!("note: {note}")));
-        Ok(())
+        Self { about, remarks: prepared.remarks.clone(), ..self }
     }
 
     /// Checks the gates after the attack by `plan`. Returns the document, and what the page draws.
-    pub(crate) fn finish<const D: usize>(
+    pub(super) fn finish<const D: usize>(
         &self,
         plan: &Plan<D>,
         attacked: Attacked,

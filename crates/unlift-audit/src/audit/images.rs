@@ -13,8 +13,9 @@ use unlift_report::{Document, RenderOptions};
 
 use super::album::Album;
 use super::items::OfItems;
-use crate::audit::{Audit, Audited};
+use super::output::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
+use crate::gate::check_gates;
 use crate::images::Opened;
 use crate::images::stream::{Tally, stream};
 use crate::inversion::Inversion;
@@ -38,8 +39,8 @@ impl Images<'_> {
     /// Attacks the images. A share-safe audit draws no pictures.
     pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
         let (plan, Opened { source, path, chosen, .. }) = (&self.plan, self.opened);
-        source.passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
-        audit.begin(&Tried::by(plan, false), None, [], progress)?;
+        source.passed_over.iter().for_each(|note| progress.note(note));
+        check_gates(&audit.gates, &Tried::by(plan, false), None)?;
         let tally = RefCell::new(Tally::default());
         let mut images = Vec::new();
         let each = |name: &str, rows: &[Row]| {
@@ -51,7 +52,7 @@ impl Images<'_> {
         let read = stream((source, path), chosen, Some(plan), &tally, progress);
         let outcome = run_many(read, plan, &mut OfItems { steps: progress, each })?;
         for error in self.inversion.iter().flat_map(|inversion| inversion.failed()) {
-            progress.say(&format!("note: not painted: {error}"));
+            progress.note(&format!("not painted: {error}"));
         }
         let tally = tally.into_inner();
         if tally.used.is_empty() {
@@ -73,7 +74,7 @@ impl Images<'_> {
         }
         let doubt = tally.doubt();
         let notes: Vec<String> = doubt.iter().cloned().chain(tally.moved()).collect();
-        notes.iter().for_each(|note| progress.say(&format!("note: {note}")));
+        notes.iter().for_each(|note| progress.note(note));
         let inverter = self.inversion.as_ref().map(|inversion| inversion.sha256());
         let attacked = Attacked {
             tried: Tried::by(plan, tally.described),
@@ -127,7 +128,7 @@ impl Images<'_> {
             let Some(photo) = photo else { continue };
             match unlift_vision::features::photo::jpeg(&photo, PREVIEW, source.turn) {
                 Ok(jpeg) => picture.photo = Some(jpeg),
-                Err(error) => progress.say(&format!("note: {error}")),
+                Err(error) => progress.note(&error.to_string()),
             }
         }
         Ok((album.pictures, album.inversions))

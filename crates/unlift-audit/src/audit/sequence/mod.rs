@@ -35,14 +35,15 @@ use unlift_report::inversions::Inversion as Sheet;
 use unlift_vision::pictures::{Points, trusted};
 
 use self::view::{Model, View};
-use super::names;
-use crate::audit::{Audit, Audited};
-use crate::document::{Attacked, Tried};
+use crate::audit::output::{Audit, Audited};
+use crate::document::{Attacked, Tried, names};
+use crate::error::check_stop;
+use crate::gate::check_gates;
 use crate::images::{FeatureSource, Opened, evenly};
 use crate::inversion::Inversion;
 use crate::maps::released::slot_of;
 use crate::sources::BY_DESCRIPTORS;
-use crate::{Error, Progress, check_stop};
+use crate::{Error, Progress};
 
 /// Images with known poses, and how they are attacked.
 pub struct Sequence<'a> {
@@ -71,7 +72,7 @@ impl Sequence<'_> {
     pub(super) fn attack(&self, audit: &Audit, progress: &dyn Progress) -> Result<Audited, Error> {
         let Opened { source, path, .. } = self.opened;
         let FeatureSource { passed_over, refused, .. } = source;
-        passed_over.iter().for_each(|note| progress.say(&format!("note: {note}")));
+        passed_over.iter().for_each(|note| progress.note(note));
         progress.show(0, 1, "reading images");
         let input = read::open(self.model)?;
         let Some(folder) = &input.model else {
@@ -112,8 +113,9 @@ impl Sequence<'_> {
             notes.push(format!("{} images: no rows for {too_many:?} queries", views.len()));
         }
         let tried = self.tried(&queries);
-        audit.begin(&tried, None, &notes, progress)?;
-        let mut options = names(&tried, audit);
+        check_gates(&audit.gates, &tried, None)?;
+        notes.iter().for_each(|note| progress.note(note));
+        let mut options = names(&tried, &audit.options);
         options.insert("queries".into(), json!(queries));
         options.extend(self.lists.as_ref().map(|by| ("lists".to_owned(), json!(by.name()))));
         if let Some(error) = self.pose_error {
@@ -436,7 +438,7 @@ fn paint(
         let name = (view.name.as_str(), view.size);
         let added = inversion.add_keypoints(name, original, &points, row, &mut sheets[at]);
         if let Err(error) = added {
-            progress.say(&format!("note: not painted: {error}"));
+            progress.note(&format!("not painted: {error}"));
         }
     }
     Ok(())

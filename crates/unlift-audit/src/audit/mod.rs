@@ -1,23 +1,21 @@
-//! The inputs of an audit, each with its plan and its attack.
+//! One audit of any input: its plan, its attack, its document and its files.
 
 mod again;
 mod album;
 mod images;
 mod items;
 mod map;
+mod output;
 mod sequence;
 mod tiles;
 
 pub use again::{Again, Maps};
 pub use images::Images;
 pub use map::{Hidden, Map};
+pub use output::{Audit, Audited, FIGURES, Files, Finished, Output, PAGE, check_file, refused};
 pub use sequence::Sequence;
 pub use tiles::Tiles;
 
-use serde_json::{Map as Options, Value, json};
-
-use crate::audit::{Audit, Audited};
-use crate::document::Tried;
 use crate::{Error, Progress};
 
 /// The input of an audit.
@@ -54,13 +52,4 @@ impl Audit {
             Input::Again(again) => again.attack(self, progress),
         }
     }
-}
-
-/// Returns the options of the user, and the names of schemes and thresholds, as recorded options.
-fn names(tried: &Tried, audit: &Audit) -> Options<String, Value> {
-    let mut options = audit.options.clone();
-    options.insert("schemes".to_owned(), json!(tried.schemes));
-    let labels = tried.thresholds.iter().map(|t| t.label.as_str());
-    options.insert("thresholds".to_owned(), labels.collect());
-    options
 }

@@ -25,12 +25,13 @@ use unlift_report::Document;
 use unlift_report::attack::{AGAIN, AGAIN_GEOMETRY};
 use unlift_report::document::Input;
 
-use super::names;
-use crate::audit::{Audit, Audited};
-use crate::document::{Attacked, Tried};
+use super::output::{Audit, Audited};
+use crate::document::{Attacked, Tried, names};
 use crate::doubts::with_sides;
+use crate::error::check_stop;
+use crate::gate::check_gates;
 use crate::maps::{self, Preparation, Prepared};
-use crate::{Error, Progress, bail, check_stop};
+use crate::{Error, Progress, bail};
 
 const SOLVER: &str = "intersection";
 
@@ -78,8 +79,8 @@ impl Maps {
             bail!("--descriptors: expected {a} values per descriptor of B, as of A, found {b}");
         }
         let of_second = |text: &String| format!("second map: {text}");
-        first.notes.extend(second.notes.iter().map(of_second));
-        first.doubts.extend(second.doubts.iter().map(of_second));
+        first.remarks.notes.extend(second.remarks.notes.iter().map(of_second));
+        first.remarks.doubts.extend(second.remarks.doubts.iter().map(of_second));
         Ok(Self { first, second: Some(second) })
     }
 
@@ -123,12 +124,14 @@ impl Again<'_> {
             doubt_of_frames(own, (&second.original, second.descriptors.as_ref()))
         });
         let frame = frame.transpose()?.flatten();
-        let doubts: Vec<String> = audit.doubts.iter().cloned().chain(frame).collect();
+        let doubts: Vec<String> = audit.remarks.doubts.iter().cloned().chain(frame).collect();
         let without = "links by geometry only: both maps need descriptors for others";
         let without = (!described).then(|| without.to_owned());
-        let notes = doubts.iter().chain(&audit.notes).cloned().chain(without).collect::<Vec<_>>();
-        audit.begin(&tried, Some(first.original.reveal()), &notes, progress)?;
-        let mut options = names(&tried, audit);
+        let notes =
+            doubts.iter().chain(&audit.remarks.notes).cloned().chain(without).collect::<Vec<_>>();
+        check_gates(&audit.gates, &tried, Some(first.original.reveal()))?;
+        notes.iter().for_each(|note| progress.note(note));
+        let mut options = names(&tried, &audit.options);
         options.insert("records_alone".into(), json!(self.plan.records_alone));
         let input = with_sides(audit.about.clone(), first.original.reveal());
         let document = Document { input, options, notes, ..Document::default() };

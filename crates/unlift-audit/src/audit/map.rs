@@ -13,10 +13,11 @@ use unlift_report::scene::{ObfuscationView, SceneBox, points_within_budget, subs
 use unlift_report::{ByAttack, Document, RenderOptions, Scene3d};
 
 use super::items::OfItems;
+use super::output::{Audit, Audited};
 use super::tiles::{Tiles, figures};
-use crate::audit::{Audit, Audited};
 use crate::document::{self, Attacked, Tried};
 use crate::doubts::{doubts, with_sides};
+use crate::gate::check_gates;
 use crate::inversion::MapInversion;
 use crate::localization::{Localize, localization};
 use crate::maps::released::slot_of;
@@ -73,7 +74,9 @@ impl Map<'_> {
         let of_hidden = release.is_some_and(|(released, _)| released.descriptors().is_some());
         let mut tried = Tried::by(plan, descriptors.is_some() || of_hidden);
         tried.localizes = localize.is_some() && !prepared.cameras.views.is_empty();
-        audit.begin(&tried, Some(points), audit.doubts.iter().chain(&audit.notes), progress)?;
+        let remarks = &audit.remarks;
+        check_gates(&audit.gates, &tried, Some(points))?;
+        remarks.doubts.iter().chain(&remarks.notes).for_each(|note| progress.note(note));
         let of_file = |error| match &audit.about.path {
             Some(file) => Error::from(unlift_io::Error::core(file, error)),
             None => Error::from(error),
@@ -142,12 +145,12 @@ impl Map<'_> {
         for row in outcome.rows.iter_mut().filter(|row| given == Some(&*row.scheme)) {
             row.add_alone(read.clone().filter(|alone| beats(alone, row)));
         }
-        let mut of_points = audit.doubts.clone();
+        let mut of_points = remarks.doubts.clone();
         of_points.extend(release.iter().flat_map(|release| follows_places(original, release)));
         let rows = (plan, &outcome.rows[..], &tile_rows[..]);
         let doubts = doubts((original, usual), release, rows, &of_points);
-        for note in doubts.notes.iter().filter(|note| !audit.doubts.contains(note)) {
-            progress.say(&format!("note: {note}"));
+        for note in doubts.notes.iter().filter(|note| !remarks.doubts.contains(note)) {
+            progress.note(note);
         }
         let inverter = self.inversion.as_ref().map(|inversion| inversion.sha256());
         let mut options = document::options(plan, &audit.options, inverter);
@@ -159,7 +162,7 @@ impl Map<'_> {
         let document = Document {
             input: with_sides(audit.about.clone(), points),
             options,
-            notes: [audit.notes.clone(), doubts.notes, notes_on_images].concat(),
+            notes: [remarks.notes.clone(), doubts.notes, notes_on_images].concat(),
             doubts: doubts.all,
             localization,
             tiles: tiles.collect(),
