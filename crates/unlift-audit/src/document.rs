@@ -122,8 +122,7 @@ pub fn evaluated(row: &Row, notes: &[String]) -> Result<Value, serde_json::Error
     Ok(value)
 }
 
-/// Lists what has no row, once per scheme, source and reason. If other rows of the source exist,
-/// the reason names the affected part.
+/// Lists what has no row, once per scheme, source and reason. If other rows of the source exist, the reason names the affected part.
 pub fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<NotAudited> {
     let same = |a: &NotAudited, b: &NotAudited| {
         (&a.scheme, &a.neighbors, &a.reason) == (&b.scheme, &b.neighbors, &b.reason)

@@ -1,5 +1,4 @@
-//! Sources of neighborhoods by name: those of the core, those that need a network, and the best one
-//! for given descriptors.
+//! Sources of neighborhoods by name: those of the core, those that need a network, and the best one for given descriptors.
 
 use std::sync::Arc;
 

@@ -35,8 +35,7 @@ pub fn refused(error: clap::Error) -> u8 {
     USAGE
 }
 
-/// Prints the error of a command, if any, and returns the exit code. A result of false means that a gate or a
-/// comparison failed.
+/// Prints the error of a command, if any, and returns the exit code. A result of false means that a gate or a comparison failed.
 pub fn finish(result: crate::Result<bool>) -> u8 {
     match result {
         Ok(true) => 0,

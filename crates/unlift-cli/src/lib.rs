@@ -25,8 +25,7 @@ fn words() -> &'static [OsString] {
     WORDS.get().map_or(&[], Vec::as_slice)
 }
 
-/// Runs the command line `words`, of which the first is the name of the program, and returns the
-/// exit code.
+/// Runs the command line `words`, of which the first is the name of the program, and returns the exit code.
 ///
 /// Call it once per process: later calls would run the first command line.
 pub fn run(words: Vec<OsString>) -> u8 {

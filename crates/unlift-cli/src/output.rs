@@ -4,8 +4,7 @@ use std::io::{self, Write};
 
 use unlift::{OneLine, is_obeyed};
 
-/// Prints `text`, lines or JSON. If the reader closes the pipe early (`| head`), the rest is
-/// dropped without an error.
+/// Prints `text`, lines or JSON. If the reader closes the pipe early (`| head`), the rest is dropped without an error.
 pub fn print(text: &str) -> crate::Result<()> {
     let text = harmless(text);
     let mut stdout = io::stdout().lock();
@@ -22,8 +21,7 @@ pub fn printed(result: io::Result<()>) -> crate::Result<()> {
     }
 }
 
-/// Escapes terminal control characters except newlines as JSON does. In JSON they occur only within
-/// strings, so no value changes.
+/// Escapes terminal control characters except newlines as JSON does. In JSON they occur only within strings, so no value changes.
 fn harmless(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -35,8 +33,7 @@ fn harmless(text: &str) -> String {
     out
 }
 
-/// Formats rows as aligned columns, two spaces apart. The first column and those in `left` are
-/// left-aligned.
+/// Formats rows as aligned columns, two spaces apart. The first column and those in `left` are left-aligned.
 pub fn table(rows: &[Vec<String>], left: &[usize]) -> String {
     let shown = |row: &Vec<String>| row.iter().map(|cell| OneLine(cell).to_string()).collect();
     let rows: Vec<Vec<String>> = rows.iter().map(shown).collect();

@@ -1,5 +1,4 @@
-//! Progress on stderr for work of more than a second: a bar on a terminal, otherwise a line per
-//! minute. `--quiet` disables both.
+//! Progress on stderr for work of more than a second: a bar on a terminal, otherwise a line per minute. `--quiet` disables both.
 
 use std::fmt::Write;
 use std::io::IsTerminal;

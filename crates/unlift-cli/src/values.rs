@@ -89,8 +89,7 @@ fn none_of<'a>(names: impl IntoIterator<Item = &'a str>, text: &str) -> String {
     format!("expected one of {}, found {text}", names.join(", "))
 }
 
-/// Parses a solver for images, which must use lists: in the plane all lines intersect, so records
-/// alone reveal nothing.
+/// Parses a solver for images, which must use lists: in the plane all lines intersect, so records alone reveal nothing.
 pub fn image_solver(text: &str) -> Result<Builtin, String> {
     let of_lists = solver(text).ok().filter(|solver| Builtin::FROM_LISTS.contains(solver));
     of_lists.ok_or_else(|| none_of(Builtin::FROM_LISTS.map(|solver| solver.name()), text))

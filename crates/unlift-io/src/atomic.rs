@@ -1,5 +1,4 @@
-//! Atomic outputs: a file is written completely or not at all, and no file of another program is
-//! lost.
+//! Atomic outputs: a file is written completely or not at all, and no file of another program is lost.
 //!
 //! An output is written beside its place as `.NAME.unlift-partial`, and renamed when it is complete.
 //! The next run of the same output replaces what a killed run left. A lock keeps two runs apart; the

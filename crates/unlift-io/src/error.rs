@@ -19,8 +19,7 @@ pub struct Error {
 }
 
 impl Error {
-    /// Creates an error about the content of `path`: what was expected at `place`, and what was
-    /// found.
+    /// Creates an error about the content of `path`: what was expected at `place`, and what was found.
     ///
     /// A place is a record, a column or a table. An empty one means the whole file, or folder.
     pub fn new(
@@ -82,8 +81,7 @@ impl Error {
         Self { path: path.into(), place: String::new(), problem }
     }
 
-    /// Adds a prefix to the place of the error: `images.npz: image a.jpg, column x: expected
-    /// ...`.
+    /// Adds a prefix to the place of the error: `images.npz: image a.jpg, column x: expected ...`.
     pub(crate) fn within(self, what: &str) -> Self {
         Self { place: format!(": {what}{}", self.place.replacen(": ", ", ", 1)), ..self }
     }

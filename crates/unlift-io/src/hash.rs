@@ -48,8 +48,7 @@ pub fn hash_list(mut named: Vec<(String, String)>) -> String {
 }
 
 /// Returns the SHA-256 of the features that an audit uses: width and height as little-endian `u32`
-/// (0 if unknown), the coordinates of keypoints as `f64`, and the values of descriptors row by row,
-/// as bytes or `f32`.
+/// (0 if unknown), the coordinates of keypoints as `f64`, and the values of descriptors row by row, as bytes or `f32`.
 pub fn hash_features(features: &ImageFeatures) -> String {
     let mut hasher = Sha256::new();
     for side in features.size.unwrap_or([0; 2]) {

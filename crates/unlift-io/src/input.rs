@@ -9,8 +9,7 @@ use crate::error::Error;
 /// Opens `path` for reading and returns it with its length in bytes.
 ///
 /// # Errors
-/// When it is missing, cannot be read, or is a folder, a pipe, a socket or a device, which may
-/// never end.
+/// When it is missing, cannot be read, or is a folder, a pipe, a socket or a device, which may never end.
 pub fn open(path: &Path) -> Result<(File, u64), Error> {
     let failed = |source| Error::read(path, source);
     // Checked before opening, because opening a pipe without a writer blocks forever.
@@ -39,8 +38,7 @@ fn regular(path: &Path, metadata: &fs::Metadata) -> Result<(), Error> {
 
 /// The least budget, because small files may repeat or compress data.
 const LEAST: u64 = 256 << 20;
-/// Bytes of memory per byte of the file. Decoding widens values by up to eight times, and real
-/// features hardly compress.
+/// Bytes of memory per byte of the file. Decoding widens values by up to eight times, and real features hardly compress.
 const MULTIPLE: u64 = 64;
 
 /// The memory that decoding one file may use: 64 times its size, at least 256 MiB.

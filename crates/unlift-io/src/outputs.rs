@@ -26,8 +26,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Returns the name of the kind, and the marks of its files, of which one begins after at most
-    /// this number of bytes.
+    /// Returns the name of the kind, and the marks of its files, of which one begins after at most this number of bytes.
     fn marks(self) -> (&'static str, usize, &'static [&'static [u8]]) {
         match self {
             Self::AuditJson => ("an audit.json", 0, &[b"{\n  \"unlift\": \""]),
@@ -137,8 +136,7 @@ impl OutputSet {
         Ok(partial)
     }
 
-    /// Moves all files to their places, in the order of [`stage`](Self::stage), unless another file
-    /// has appeared at one.
+    /// Moves all files to their places, in the order of [`stage`](Self::stage), unless another file has appeared at one.
     pub fn commit(mut self) -> Result<(), Error> {
         for (file, kind) in &self.files {
             self.rules.check(&file.path, *kind)?;

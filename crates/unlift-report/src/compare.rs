@@ -66,8 +66,7 @@ pub struct Comparison {
     pub tolerance_points: f64,
     /// The origin of the tolerance: `twice the spread of repeats` or `usual without repeats`.
     pub tolerance_is: &'static str,
-    /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs, or of inputs whose difference is
-    /// accepted.
+    /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs, or of inputs whose difference is accepted.
     pub passed: bool,
     /// Inputs that differ, so that a smaller figure may say nothing.
     pub different: Vec<String>,
@@ -136,8 +135,7 @@ pub struct Incomparable {
 
 /// Usual largest difference between seeds of one audit, in percentage points.
 const USUAL_TOLERANCE: f64 = 2.0;
-/// Growth of a localization error that counts as the same; random directions change it by some
-/// percent.
+/// Growth of a localization error that counts as the same; random directions change it by some percent.
 const GROWTH: f64 = 1.1;
 
 /// Compares the figures of two audits. Rows match by scheme, source, noise, requested inlier ratio (a measured one is a result),
@@ -314,8 +312,7 @@ pub(crate) fn different(a: &Input, b: &Input) -> Vec<Incomparable> {
     different
 }
 
-/// Returns the schemes of the old audit that localize less precisely in the new one, or whose
-/// error is no longer known.
+/// Returns the schemes of the old audit that localize less precisely in the new one, or whose error is no longer known.
 fn costs_more(old: &Document, new: &Document) -> Vec<CostsMore> {
     let mut all = old.localization.iter().chain(&new.localization);
     let is_measured = all.all(|of| of.measured().is_some());

@@ -29,8 +29,7 @@ fn entry(gate: &GateResult) -> Value {
     json!({ "gate": gate.gate, "passed": gate.passed, "said": in_words(gate) })
 }
 
-/// Returns a line per gate: whether it held, the figure found, and its attack. The text ends with a line break
-/// or is empty.
+/// Returns a line per gate: whether it held, the figure found, and its attack. The text ends with a line break or is empty.
 pub fn gate_lines(document: &Document) -> String {
     let line = |gate: &GateResult| {
         let word = if gate.passed { "held" } else { "FAILED" };

@@ -168,8 +168,7 @@ impl<'a> Results<'a> {
         rows
     }
 
-    /// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's
-    /// name.
+    /// Returns the percentage by the records alone within `typed`, the best of the scheme's rows, and the attack's name.
     pub(crate) fn records_alone(
         &self,
         scheme: &str,

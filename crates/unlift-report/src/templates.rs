@@ -6,8 +6,7 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use crate::document::Error;
 use crate::words;
 
-/// Renders the first of `sources`, which includes the others by their names. Text is escaped in HTML; an undefined name is an
-/// error.
+/// Renders the first of `sources`, which includes the others by their names. Text is escaped in HTML; an undefined name is an error.
 pub(crate) fn render(
     sources: &[(&'static str, &'static str)],
     values: &serde_json::Value,

@@ -16,8 +16,7 @@ fn base(scheme: &str) -> &str {
     scheme.split('_').next().unwrap_or(scheme)
 }
 
-/// Returns the title of a scheme, with its changes to the map: `olc_thin4` is "Random lines, thin4". An
-/// unknown scheme keeps its name.
+/// Returns the title of a scheme, with its changes to the map: `olc_thin4` is "Random lines, thin4". An unknown scheme keeps its name.
 pub(crate) fn scheme_title(scheme: &str) -> String {
     match facts(scheme) {
         Some(facts) => scheme.replace('_', ", ").replacen(base(scheme), facts.title, 1),
@@ -100,8 +99,7 @@ pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
-    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of
-    // nines.
+    // Rounding through decimal text is exact; `(value * 10^n).round() / 10^n` leaves a tail of nines.
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }
 
@@ -198,8 +196,7 @@ pub(crate) fn bytes(count: u64) -> String {
     }
 }
 
-/// Aligns rows of text: columns are as wide as their widest cell and two spaces apart; those in `left` are flush left,
-/// others flush right.
+/// Aligns rows of text: columns are as wide as their widest cell and two spaces apart; those in `left` are flush left, others flush right.
 pub fn align(rows: &[Vec<String>], left: &[usize]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {

@@ -5,8 +5,8 @@
   const NOT_DRAWN = 65535;
   const DARK = "#10141a";
   const GRAY = "#4a505a";
-  const HIT = "#53b4f5";
-  const MISS = "#ffa238";
+  const HIT = window.Unlift.css("--hit");
+  const MISS = window.Unlift.css("--miss");
   const SHORT = "#35c46f";
   const LONG = "#ff5a4d";
 
@@ -156,7 +156,7 @@
     }
     const heads = (ends) => ends.filter((_, i) => i % 4 > 1);
     const faint = opacity(groups.miss.length / 4, 0.75);
-    arrows(pane, groups.miss, `rgba(255,162,56,${Math.max(0.3, faint)})`);
+    arrows(pane, groups.miss, MISS + Math.round(255 * Math.max(0.3, faint)).toString(16));
     dots(pane, heads(groups.miss), 1.6, MISS);
     arrows(pane, groups.hit, HIT);
     dots(pane, heads(groups.hit), 1.9, HIT);

@@ -3,12 +3,12 @@
 
 (() => {
   const THREE = window.UnliftVendor;
-  const { element, length } = window.Unlift;
+  const { element, length, css } = window.Unlift;
   const NOT_DRAWN = 65535;
   const BACKGROUND = "#10141a";
-  /** Colors below (blue) and above (orange) the threshold, suitable for color-blind readers. */
-  const HIT = ["#e3f6ff", "#3d9be0"];
-  const MISS = ["#ffb14a", "#b3331a"];
+  /** Colors of the least and the largest error below and above the threshold. */
+  const HIT = [css("--hit-least"), css("--hit-most")];
+  const MISS = [css("--miss-least"), css("--miss-most")];
   /** Decades of error in the color scale on each side of the threshold. */
   const DECADES = 1.5;
   /** Field of view in degrees: a scene fits from 2.5 radii away; from a camera of the map it is as wide as a phone's. */

@@ -10,8 +10,7 @@
 //! records (`Shuffle`), slots or descriptors.
 //!
 //! **Limits.** A key from an integer is only as safe as the integer is hard to guess: each guess
-//! can be checked with one block. Use [`Key::from_seed`] for experiments and [`Key::fresh`] for a
-//! map that is released.
+//! can be checked with one block. Use [`Key::from_seed`] for experiments and [`Key::fresh`] for a map that is released.
 
 use chacha20::ChaCha20Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
@@ -112,8 +111,7 @@ mod tests {
     #[rustfmt::skip] // One row per line.
     fn bits_are_pinned() {
         // A change here changes every published figure. The values come from an independent
-        // ChaCha20 in Python after the RFC: stage key = first half block of (key, stage), then
-        // (stage key, item).
+        // ChaCha20 in Python after the RFC: stage key = first half block of (key, stage), then (stage key, item).
         let [zero, seven] = [0, 7].map(Key::from_seed);
         let image = seven.of_item(Stage::Image, 1 << 40);
         for (key, stage, item, [first, second, below, unit]) in [

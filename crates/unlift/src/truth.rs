@@ -1,5 +1,4 @@
-//! Ground truth: originals and secrets, for the owner only. The attacker's crate, `unlift-attack`,
-//! does not depend on this one.
+//! Ground truth: originals and secrets, for the owner only. The attacker's crate, `unlift-attack`, does not depend on this one.
 
 use crate::geometry::frame::Bounds;
 use crate::{Error, Fingerprint, PointSet};
@@ -26,8 +25,7 @@ impl OriginalId {
     }
 }
 
-/// The true points of a map. Only [`reveal`](Self::reveal) returns them, and recovery takes no
-/// argument that contains them:
+/// The true points of a map. Only [`reveal`](Self::reveal) returns them, and recovery takes no argument that contains them:
 ///
 /// ```compile_fail
 /// use unlift::{recover, truth::Original};
@@ -128,8 +126,7 @@ impl Secret {
     ///
     /// # Errors
     /// When columns differ in length, an original is neither in exactly one slot nor dropped
-    /// exactly once, slots do not fill the records, or a record's descriptor rows belong to another
-    /// record.
+    /// exactly once, slots do not fill the records, or a record's descriptor rows belong to another record.
     pub fn try_new(
         hidden: Vec<OriginalId>,
         swapped_axis: Option<Vec<u8>>,

@@ -86,8 +86,7 @@ impl Observer<2> for Page<'_> {
 }
 
 /// Returns the true positions of the neighbors of `slot` in the drawn graph: those with the highest
-/// scores. Lists without scores (oracle) are cut at the beginning, which is random because record
-/// numbers are.
+/// scores. Lists without scores (oracle) are cut at the beginning, which is random because record numbers are.
 fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
     let lists = cell.lists;
     let listed = lists.of(slot);

@@ -156,8 +156,7 @@ fn telling(plan: &Plan<2>, figures: &[ImageFigures]) -> Vec<(usize, &'static str
     let label = &plan.thresholds[plan.headline].label;
     let per_scheme = plan.rows_per_scheme();
     let variants = plan.variants();
-    // The first solver's row of the variant nearest to the usual ratio; other sources have no
-    // requested ratio.
+    // The first solver's row of the variant nearest to the usual ratio; other sources have no requested ratio.
     let away = |&at: &usize| {
         variants[at].inlier_ratio.map_or(f64::INFINITY, |ratio| (ratio - USUAL_RATIO).abs())
     };

@@ -118,8 +118,7 @@ pub fn refused(error: unlift_io::Error) -> Error {
 /// Checks that the file `path`, which `option` names, may be written, and returns its absolute place
 /// with links resolved. Call it before and after the work.
 ///
-/// Like [`Output::open`] for folders, it reports a place that cannot be written as an error of the
-/// command line.
+/// Like [`Output::open`] for folders, it reports a place that cannot be written as an error of the command line.
 pub fn check_file(option: &str, path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
     let refused = |error: unlift_io::Error| Error::request(format!("{option}: {error}"));
     let place = rules.check(path, kind).map_err(refused)?;

@@ -15,8 +15,7 @@ pub(super) struct Tile {
     pub at: usize,
     /// Rows of the map's points, ascending.
     pub rows: Vec<u32>,
-    /// The lowest and highest corner of its points in plan view, without the outer 2 % on every
-    /// side, which may be outliers.
+    /// The lowest and highest corner of its points in plan view, without the outer 2 % on every side, which may be outliers.
     pub bounds: [[f64; 2]; 2],
 }
 

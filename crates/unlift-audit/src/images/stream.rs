@@ -1,5 +1,4 @@
-//! Images for an audit, one after the other. The next ones are read in parallel; broken ones in
-//! files are reported and skipped.
+//! Images for an audit, one after the other. The next ones are read in parallel; broken ones in files are reported and skipped.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -67,8 +66,7 @@ impl Tally {
         }
     }
 
-    /// Returns a doubt if the images are declared larger than the area of their keypoints. Schemes
-    /// and attacks use the declared size.
+    /// Returns a doubt if the images are declared larger than the area of their keypoints. Schemes and attacks use the declared size.
     pub fn doubt(&self) -> Option<String> {
         let Bounds { low, high } = self.filled.as_ref()?;
         let share = (high[0] - low[0]) * (high[1] - low[1]);

@@ -15,8 +15,7 @@ use crate::args::MapArgs;
 use crate::demo::photos;
 use crate::progress::Progress;
 
-/// Runs `work` on `RAYON_NUM_THREADS` threads (default: all cores). rayon's global pool would panic
-/// if the system refuses threads.
+/// Runs `work` on `RAYON_NUM_THREADS` threads (default: all cores). rayon's global pool would panic if the system refuses threads.
 pub fn with_threads<T: Send>(work: impl FnOnce() -> crate::Result<T> + Send) -> crate::Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().build();
     let pool = pool

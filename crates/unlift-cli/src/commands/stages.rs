@@ -1,5 +1,4 @@
-//! The stages `obfuscate`, `neighbors`, `recover` and `evaluate`: of a map, or of many images, of which only a few are in memory at a
-//! time.
+//! The stages `obfuscate`, `neighbors`, `recover` and `evaluate`: of a map, or of many images, of which only a few are in memory at a time.
 
 use std::cell::RefCell;
 use std::collections::HashSet;

@@ -24,8 +24,7 @@ use crate::read::lines::quoted;
 const TABLES: [&str; 4] = ["images", "cameras", "keypoints", "descriptors"];
 /// SQLite steps between two checks of the limit.
 const STEPS_AT_A_TIME: u64 = 1000;
-/// The step limit of one query is `LEAST_STEPS`, plus `STEPS_PER_BYTE` for every byte of the file.
-/// A row takes about ten steps.
+/// The step limit of one query is `LEAST_STEPS`, plus `STEPS_PER_BYTE` for every byte of the file. A row takes about ten steps.
 const LEAST_STEPS: u64 = 1_000_000;
 const STEPS_PER_BYTE: u64 = 4;
 

@@ -1,5 +1,4 @@
-//! Reads and writes features in hloc's layout: an HDF5 group per image, an array per kind of
-//! feature.
+//! Reads and writes features in hloc's layout: an HDF5 group per image, an array per kind of feature.
 
 use std::collections::BTreeSet;
 use std::fmt::Display;
@@ -68,8 +67,7 @@ impl Hloc {
         Err(Error::new(path, "", GROUPS, found))
     }
 
-    /// Lists all groups of the file of `len` bytes that contain arrays directly, and errors about
-    /// broken links.
+    /// Lists all groups of the file of `len` bytes that contain arrays directly, and errors about broken links.
     fn list(&self, len: u64) -> Result<(Groups, Vec<Error>), Error> {
         let wrong =
             |error: hdf5_pure::Error| Error::new(&self.path, "", "a whole HDF5 file", error);
@@ -383,8 +381,7 @@ pub(crate) fn is_ours(path: &Path) -> bool {
     caught(is_ours).ok().flatten().unwrap_or(false)
 }
 
-/// A feature file in hloc's layout that is written image by image, and moved to its place when it
-/// is complete.
+/// A feature file in hloc's layout that is written image by image, and moved to its place when it is complete.
 ///
 /// Each image is a group with `keypoints` `(N, 2)` and, if present, `descriptors` `(D, N)`,
 /// `scores`, `scales` and `oris` `(N,)` and `image_size` `(2,)`; see `docs/formats.md`. Names and
@@ -560,8 +557,7 @@ fn columns(image: &ImageFeatures) -> Vec<Column> {
     columns
 }
 
-/// Returns the bytes of `values` as half floats, as hloc stores descriptors of networks, if all are
-/// exact.
+/// Returns the bytes of `values` as half floats, as hloc stores descriptors of networks, if all are exact.
 fn halves(values: &[f32]) -> Option<Vec<u8>> {
     let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
     let halves: Vec<f16> = values.iter().map(exact).collect::<Option<_>>()?;

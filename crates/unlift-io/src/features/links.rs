@@ -17,8 +17,7 @@ pub(super) enum Target {
 }
 
 /// Returns names and targets of the links of the group whose object header is at `address`. The
-/// library skips links by path, or fails on them. Large groups, which list their links in a
-/// separate heap, have none here.
+/// library skips links by path, or fails on them. Large groups, which list their links in a separate heap, have none here.
 ///
 /// Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message),
 /// and III.A to III.D (groups of the old form).
@@ -38,8 +37,7 @@ pub(super) fn links(file: &impl Source, address: u64) -> Option<Vec<(String, Tar
     } else {
         (address + 16, number(&start[8..12]))
     };
-    // Bytes of the type of a message, and of all before its body. A flag states that messages have
-    // numbers.
+    // Bytes of the type of a message, and of all before its body. A flag states that messages have numbers.
     let (kind, head) = match is_new {
         true => (1, if flags & 4 != 0 { 6 } else { 4 }),
         false => (2, 8),

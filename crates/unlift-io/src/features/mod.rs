@@ -42,8 +42,7 @@ pub struct ImageFeatures {
     pub orientations_deg: Option<Vec<f32>>,
     /// Standard deviation of a keypoint's position in pixels, as stated by the detector.
     pub uncertainty_px: Option<f64>,
-    /// True if keypoints are in pixels of the photo rotated upright by its EXIF orientation. COLMAP
-    /// and hloc use the photo as stored.
+    /// True if keypoints are in pixels of the photo rotated upright by its EXIF orientation. COLMAP and hloc use the photo as stored.
     pub upright: bool,
     /// The path of the photo, if the source is a folder of photos.
     pub photo: Option<PathBuf>,

@@ -92,8 +92,7 @@ impl<R: Read> Bytes<R> {
         Error::new(&self.path, place, expected, found)
     }
 
-    /// Returns the size of `n` rows of `stride` bytes, or an error if the file has fewer bytes
-    /// left.
+    /// Returns the size of `n` rows of `stride` bytes, or an error if the file has fewer bytes left.
     pub fn expect_rows(&self, n: u64, what: &str, stride: u64) -> Result<u64, Error> {
         let size = n.checked_mul(stride).filter(|&size| size <= self.remaining());
         size.ok_or_else(|| {
@@ -175,8 +174,7 @@ impl<R: Read> Bytes<R> {
 
     /// Reads a `u64` count of `what`, each of at least `bytes_each` bytes.
     ///
-    /// A count that the rest of the file cannot hold is an error, so that nothing is allocated for
-    /// it.
+    /// A count that the rest of the file cannot hold is an error, so that nothing is allocated for it.
     pub fn count(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
         if self.remaining() < 8 {
             self.check(8, &format!("the number of {what}"))?;
@@ -221,8 +219,7 @@ impl Scalar {
     pub const F32: Self = Self { kind: b'f', size: 4 };
     pub const F64: Self = Self { kind: b'f', size: 8 };
 
-    /// Returns a type by its size in bytes and kind: `f` float, `i` signed, `u` unsigned, in either
-    /// case.
+    /// Returns a type by its size in bytes and kind: `f` float, `i` signed, `u` unsigned, in either case.
     pub fn of_kind(kind: u8, size: u64) -> Option<Self> {
         let kind = kind.to_ascii_lowercase();
         let sizes: &[u64] = match kind {

@@ -192,12 +192,10 @@ pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
     Ok(images)
 }
 
-/// Reads the cameras and images of the model in the folder `model`, in the form that
-/// [`super::open`] reads.
+/// Reads the cameras and images of the model in the folder `model`, in the form that [`super::open`] reads.
 ///
 /// # Errors
-/// When [`read_cameras`] or [`read_images`] fails, or an image names a missing camera or has no
-/// pose.
+/// When [`read_cameras`] or [`read_images`] fails, or an image names a missing camera or has no pose.
 pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
     let extension = if model.join("images.bin").is_file() { "bin" } else { "txt" };
     let cameras = read_cameras(&model.join(format!("cameras.{extension}")))?;
@@ -216,8 +214,7 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
     Ok((cameras, images))
 }
 
-/// Reads `points3D.bin` or `points3D.txt`, sorted by id. Tracks are read only if `with_tracks` is
-/// set.
+/// Reads `points3D.bin` or `points3D.txt`, sorted by id. Tracks are read only if `with_tracks` is set.
 ///
 /// # Errors
 /// When the file is malformed or repeats an id.

@@ -1,5 +1,4 @@
-//! Reads descriptors of the points of a map: a file with a row per point, or means over the
-//! observations of points in images.
+//! Reads descriptors of the points of a map: a file with a row per point, or means over the observations of points in images.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -150,8 +149,7 @@ fn tracks(path: &Path, input: &Input) -> Result<(Vec<Image>, Vec<Observation>), 
     let extension = points_path.extension().unwrap_or_default();
     let images = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&images)?;
-    // Sorted by image, so that one image is in memory at a time, and by id, so that sums of floats
-    // are deterministic.
+    // Sorted by image, so that one image is in memory at a time, and by id, so that sums of floats are deterministic.
     let mut observations = Vec::new();
     for (out, id) in input.ids.iter().enumerate() {
         let place = || format!("point {id}");
@@ -168,8 +166,7 @@ fn tracks(path: &Path, input: &Input) -> Result<(Vec<Image>, Vec<Observation>), 
     Ok((images, observations))
 }
 
-/// Returns the mean over the observations of each point. `stored` reads the descriptors of an
-/// image.
+/// Returns the mean over the observations of each point. `stored` reads the descriptors of an image.
 ///
 /// # Errors
 /// Also when descriptors of one point are no more alike than those of others.

@@ -1,5 +1,4 @@
-//! Reads maps in JSON as a stream, distinguished by their keys: OpenSfM's `reconstruction.json` and
-//! nerfstudio's `transforms.json`.
+//! Reads maps in JSON as a stream, distinguished by their keys: OpenSfM's `reconstruction.json` and nerfstudio's `transforms.json`.
 
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};

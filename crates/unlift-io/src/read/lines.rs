@@ -11,8 +11,7 @@ use crate::input::{self, Budget};
 
 /// The maximum length of a line in bytes, enough for the track of a point in a million photos.
 pub(crate) const LONGEST_LINE: u64 = 16 << 20;
-/// The least number of points at which a column of row numbers is an error. Fewer may match by
-/// accident.
+/// The least number of points at which a column of row numbers is an error. Fewer may match by accident.
 pub(super) const TELLING: usize = 10;
 
 /// A reader of text lines, counted from 1, as bytes: names need not be UTF-8.
@@ -41,8 +40,7 @@ impl Lines {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
-    /// Returns an error if `n` rows of `n_values` values, with a digit and a separator each, exceed
-    /// the rest of the file.
+    /// Returns an error if `n` rows of `n_values` values, with a digit and a separator each, exceed the rest of the file.
     pub fn expect_room(&self, n: u64, what: &str, n_values: u64) -> Result<(), Error> {
         let most = (self.len.saturating_sub(self.at) + 1) / n_values.saturating_mul(2);
         if n <= most {
@@ -52,8 +50,7 @@ impl Lines {
         Err(Error::new(&self.path, "header", expected, n.to_string()))
     }
 
-    /// Reads the next line. Returns false at the end of the file. A zero byte or a line over
-    /// [`LONGEST_LINE`] is an error.
+    /// Reads the next line. Returns false at the end of the file. A zero byte or a line over [`LONGEST_LINE`] is an error.
     pub fn advance(&mut self) -> Result<bool, Error> {
         self.line.clear();
         let mut limited = self.reader.by_ref().take(LONGEST_LINE + 1);
@@ -77,8 +74,7 @@ impl Lines {
         Ok(true)
     }
 
-    /// Reads up to the next line that is neither blank nor a comment. Returns false at the end of
-    /// the file.
+    /// Reads up to the next line that is neither blank nor a comment. Returns false at the end of the file.
     pub fn advance_to_data(&mut self) -> Result<bool, Error> {
         while self.advance()? {
             let line = self.line();

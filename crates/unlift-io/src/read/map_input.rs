@@ -7,13 +7,11 @@ use unlift::geometry::camera::Pose;
 /// A map as it was read, in the units of its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Input {
-    /// Points `(n, 3)`, all finite, at least one. COLMAP's are sorted by id, others are in the
-    /// order of the file.
+    /// Points `(n, 3)`, all finite, at least one. COLMAP's are sorted by id, others are in the order of the file.
     pub positions: Vec<[f64; 3]>,
     /// Ids `(n,)`, ascending: those of COLMAP, else rows of the file, counted from 0.
     pub ids: Vec<u64>,
-    /// Rows of points that are left out because a coordinate is not finite, among all points in the
-    /// order of `positions`.
+    /// Rows of points that are left out because a coordinate is not finite, among all points in the order of `positions`.
     pub left_out: Vec<u64>,
     /// Camera centers `(m, 3)`. Empty if the format has none.
     pub cameras: Vec<[f64; 3]>,
@@ -47,8 +45,7 @@ impl Input {
         self.positions.len() + self.left_out.len()
     }
 
-    /// Adds a camera: its center and the direction that points up in its photo, or `None` without
-    /// a pose.
+    /// Adds a camera: its center and the direction that points up in its photo, or `None` without a pose.
     pub(crate) fn camera(&mut self, pose: Option<([f64; 3], [f64; 3])>) {
         match pose.filter(|(center, up)| is_finite(center) && is_finite(up)) {
             Some((center, up)) => {
@@ -128,11 +125,9 @@ pub fn center(rotation: &[[f64; 3]; 3], translation: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| -along(c))
 }
 
-/// Returns the pose `x_cam = R x + t`, given as a quaternion (w, x, y, z) and `t`. Not finite for a
-/// zero quaternion.
+/// Returns the pose `x_cam = R x + t`, given as a quaternion (w, x, y, z) and `t`. Not finite for a zero quaternion.
 pub(super) fn pose_of([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Pose {
-    // The rotation times the squared norm, by which it is divided because files contain norms such
-    // as 0.9999999.
+    // The rotation times the squared norm, by which it is divided because files contain norms such as 0.9999999.
     let r = [
         [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
         [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],

@@ -20,8 +20,7 @@ const PLACES: [&str; 8] = [
     "dslr_calibration_undistorted",
     "rig_calibration_undistorted",
 ];
-/// The place of undistorted models: `sparse` in it or in its numbered subfolders. They are read
-/// only if there is no other model.
+/// The place of undistorted models: `sparse` in it or in its numbered subfolders. They are read only if there is no other model.
 const UNDISTORTED: &str = "dense";
 const DATABASES: [&str; 2] = ["database.db", "colmap/database.db"];
 /// Places of a database if the folder that was given is the model itself.

@@ -97,11 +97,9 @@ fn size_of(text: &str) -> Option<u64> {
     n.checked_mul(if text.starts_with('U') { 4 } else { 1 })
 }
 
-/// Reads descriptors `(n, dim)` from an `.npy` file of bytes or of floats of 2, 4 or 8 bytes, in
-/// either byte and memory order.
+/// Reads descriptors `(n, dim)` from an `.npy` file of bytes or of floats of 2, 4 or 8 bytes, in either byte and memory order.
 ///
-/// Returns the row-major values and `dim`. Floats of 8 bytes are rounded to 4. The number of rows
-/// must be one of `counts`.
+/// Returns the row-major values and `dim`. Floats of 8 bytes are rounded to 4. The number of rows must be one of `counts`.
 pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), Error> {
     let mut bytes = Bytes::open(path)?;
     let header = Header::read(&mut bytes)?;
@@ -232,8 +230,7 @@ impl Header {
         let keys = [format!("'{key}'"), format!("\"{key}\"")];
         let (_, text) = keys.iter().find_map(|key| self.0.split_once(key))?;
         let text = text.trim_start().strip_prefix(':')?.trim_start();
-        // A tuple or a list ends with its bracket, other values with a comma or the end of the
-        // dictionary.
+        // A tuple or a list ends with its bracket, other values with a comma or the end of the dictionary.
         let end = match text.as_bytes().first()? {
             b'(' => text.find(')')? + 1,
             b'[' => text.find(']')? + 1,
@@ -255,8 +252,7 @@ impl Header {
         self.scalar().is_some_and(|(scalar, _)| scalar.is_whole())
     }
 
-    /// Returns the number of points and the places of their coordinates, if the array can be
-    /// points.
+    /// Returns the number of points and the places of their coordinates, if the array can be points.
     pub(super) fn points(&self) -> Option<(u64, Layout)> {
         if !self.type_text().starts_with('[') {
             let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;

@@ -100,8 +100,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
 }
 
 const SPLATS: &str = "Gaussian splats: only their centers are read";
-/// Reads the centers of splats in antimatter15's format: 32 bytes each, which begin with three
-/// floats.
+/// Reads the centers of splats in antimatter15's format: 32 bytes each, which begin with three floats.
 pub fn splats(path: &Path) -> Result<Input, Error> {
     const SPLAT: u64 = 32;
     let mut bytes = Bytes::open(path)?;

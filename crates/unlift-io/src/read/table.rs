@@ -6,16 +6,14 @@ use super::lines::{Lines, TELLING, axes, coordinate, is_called, number, plain, q
 use super::map_input::Input;
 use crate::error::Error;
 
-/// The byte between values, or `None` for any run of spaces and tabs. The first line decides it for
-/// the whole file.
+/// The byte between values, or `None` for any run of spaces and tabs. The first line decides it for the whole file.
 type Separator = Option<u8>;
 
 fn separator_of(line: &[u8]) -> Separator {
     [b';', b','].into_iter().find(|byte| line.contains(byte))
 }
 
-/// Returns the separator of a header line. A tab is one, because names may contain spaces and fields
-/// may be empty.
+/// Returns the separator of a header line. A tab is one, because names may contain spaces and fields may be empty.
 fn separator_of_header(line: &[u8]) -> Separator {
     separator_of(line).or_else(|| line.contains(&b'\t').then_some(b'\t'))
 }
@@ -37,8 +35,7 @@ const COLMAP_COLUMNS: usize = 8;
 ///
 /// The first three columns are x, y and z, unless the first line or a comment (`#` or `//`) before
 /// it names columns `x`, `y` and `z` (in either case). A line of one number before points is their
-/// count, as in Leica's PTS and in CloudCompare. Rows that are camera poses or begin with the row
-/// number are an error.
+/// count, as in Leica's PTS and in CloudCompare. Rows that are camera poses or begin with the row number are an error.
 pub fn read(path: &Path) -> Result<Option<Input>, Error> {
     let mut lines = Lines::open(path)?;
     let mut positions = Vec::new();
@@ -243,8 +240,7 @@ struct Form {
     colmap: bool,
     has_track: bool,
     ascending: bool,
-    /// A trajectory: a time, a position and a unit quaternion, or the three rows of a rotation and
-    /// a position.
+    /// A trajectory: a time, a position and a unit quaternion, or the three rows of a rotation and a position.
     pose: bool,
     time: f64,
     /// The first value is the row number, counted from 0 or from 1.

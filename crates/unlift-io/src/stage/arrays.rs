@@ -36,8 +36,7 @@ impl<'a> Arrays<'a> {
         Self { path, archive, arrays, meta: Meta::empty(path) }.with_meta()
     }
 
-    /// Returns the arrays of one image of this file, each with its index and its name below that of
-    /// the image.
+    /// Returns the arrays of one image of this file, each with its index and its name below that of the image.
     pub(super) fn of_image(&self, arrays: Vec<(usize, String)>) -> Result<Self, Error> {
         let (path, archive, meta) = (self.path, self.archive.clone(), self.meta.clone());
         Self { path, archive, arrays, meta }.with_meta()

@@ -29,8 +29,7 @@ pub struct ImageFile<'a> {
     waiting: IntoIter<(String, Vec<(usize, String)>)>,
 }
 
-/// The arrays of one image. Readers fail as those of maps do, with the name of the image; rows are
-/// counted within it.
+/// The arrays of one image. Readers fail as those of maps do, with the name of the image; rows are counted within it.
 pub struct ImageRows<'a> {
     name: String,
     arrays: Arrays<'a>,
@@ -40,8 +39,7 @@ impl<'a> ImageFile<'a> {
     /// Opens `path`, a file of images of `kind`.
     ///
     /// # Errors
-    /// When it is not a stage file of this kind, has no images, or the arrays of an image do not
-    /// follow one another.
+    /// When it is not a stage file of this kind, has no images, or the arrays of an image do not follow one another.
     pub fn open(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let file = Arrays::open(path)?;
         if let Some(other) = file.meta.kind()?.filter(|its| *its != kind) {
@@ -130,8 +128,7 @@ impl ImageRows<'_> {
         self.read(truth_of)
     }
 
-    /// Returns the neighborhoods of an image of `n_records` records with `slots_per_record` slots
-    /// each.
+    /// Returns the neighborhoods of an image of `n_records` records with `slots_per_record` slots each.
     pub fn neighborhoods(
         self,
         n_records: usize,
@@ -155,8 +152,7 @@ const OF_ALL: [&str; 5] = ["kind", "version", "unit", "family", "slots_per_recor
 
 /// A writer of a stage file of images, into an [`OutputFile`] that the caller commits.
 ///
-/// Nothing is kept in memory but names. The same images in the same order give the same bytes.
-/// Images without rows are not stored.
+/// Nothing is kept in memory but names. The same images in the same order give the same bytes. Images without rows are not stored.
 pub struct ImageWriter<'a> {
     path: PathBuf,
     zip: Zip<'a>,

@@ -41,8 +41,7 @@ impl Kind {
         Self::Recovered,
     ];
 
-    /// The name in files, the name in errors, and the arrays that a file may have besides the
-    /// metadata.
+    /// The name in files, the name in errors, and the arrays that a file may have besides the metadata.
     fn facts(self) -> (&'static str, &'static str, &'static str) {
         match self {
             Self::Released => ("released", "a released map", RELEASED),

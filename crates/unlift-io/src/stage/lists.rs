@@ -11,8 +11,7 @@ use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
 
-/// Writes neighborhoods, one row per slot: `records` and, if present, `scores`. Shorter lists end
-/// with -1 (and a score of NaN).
+/// Writes neighborhoods, one row per slot: `records` and, if present, `scores`. Shorter lists end with -1 (and a score of NaN).
 pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result<(), Error> {
     write_file(path, Access::Private, written(neighborhoods))
 }
@@ -65,8 +64,7 @@ pub(super) fn neighborhoods_of(
 /// rows are in the order of points; -1 stands for no neighbor. A point is a record of one slot.
 ///
 /// # Errors
-/// When the file differs from `docs/formats.md`, such as a list with a point that is out of range,
-/// listed twice or the list's own.
+/// When the file differs from `docs/formats.md`, such as a list with a point that is out of range, listed twice or the list's own.
 pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<Neighborhoods, Error> {
     let arrays = Arrays::open(path)?;
     arrays.expect(Kind::PointNeighborhoods)?;

@@ -1,5 +1,4 @@
-//! Stage files: the NumPy archives (`.npz`) that commands exchange, each of one kind, of a map or
-//! of many images.
+//! Stage files: the NumPy archives (`.npz`) that commands exchange, each of one kind, of a map or of many images.
 //!
 //! `docs/formats.md` describes them. Released maps, lists and recovered points contain nothing of
 //! the ground truth: no ids, names or times of their source. Equal values make equal bytes.
@@ -45,8 +44,7 @@ pub fn has_images(path: &Path) -> Result<bool, Error> {
     Ok(Archive::open(path)?.arrays().iter().any(|(_, name)| name.contains('/')))
 }
 
-/// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and
-/// declares one.
+/// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and declares one.
 pub fn declared_kind(path: &Path) -> Option<Kind> {
     Arrays::open(path).ok()?.meta.kind().ok()?
 }

@@ -12,8 +12,7 @@ use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
 
-/// Writes recovered points, one row per slot. Positions are in the map's frame (the origin is
-/// added).
+/// Writes recovered points, one row per slot. Positions are in the map's frame (the origin is added).
 ///
 /// Adding the origin loses digits of points that are closer to it than 2^-29 of its size (2 mm at
 /// coordinates of 10^6 m), by at most 10^-10 m. No position in the map's frame changes.
@@ -68,8 +67,7 @@ pub(super) fn written<'a, const D: usize>(
 /// Reads recovered points of dimension `D`, in `usual` units unless the file states others.
 ///
 /// Only `position` is required. Without `status`, a point is recovered, or without support if its
-/// coordinates are NaN; `support` and `evidence` default to 0. Confidence requires both of its
-/// arrays.
+/// coordinates are NaN; `support` and `evidence` default to 0. Confidence requires both of its arrays.
 pub fn read_recovered<const D: usize>(
     path: &Path,
     usual: Option<Unit>,

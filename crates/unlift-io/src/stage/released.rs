@@ -117,8 +117,7 @@ fn corners<const D: usize>(bounds: &Bounds<D>) -> impl Iterator<Item = f64> + us
 
 /// Reads a released map of dimension `D`.
 ///
-/// Directions need not have unit length, and feet need not be nearest to the origin: records are
-/// normalized.
+/// Directions need not have unit length, and feet need not be nearest to the origin: records are normalized.
 ///
 /// # Errors
 /// When the file differs from `docs/formats.md`, or has another dimension.
@@ -126,8 +125,7 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
     released_of(&Arrays::open(path)?)
 }
 
-/// Returns the name of the scheme that the released map at `path` states, if any. unlift writes
-/// none.
+/// Returns the name of the scheme that the released map at `path` states, if any. unlift writes none.
 ///
 /// # Errors
 /// When it is not a stage file, or the name is not text.
@@ -136,8 +134,7 @@ pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
 }
 
 /// Returns positions that the file at `path` publishes, one per record: those of its arrays as they
-/// are written, feet and centers, and these plus directions. Nothing of them is left in the normal
-/// form of [`read_released`].
+/// are written, feet and centers, and these plus directions. Nothing of them is left in the normal form of [`read_released`].
 ///
 /// # Errors
 /// When it is no released map of dimension `D`.

@@ -171,8 +171,7 @@ impl<'a> Zip<'a> {
     }
 }
 
-/// A file that keeps its first error instead of returning it: a `ZipWriter` that is dropped after an
-/// error tries again and prints.
+/// A file that keeps its first error instead of returning it: a `ZipWriter` that is dropped after an error tries again and prints.
 struct Target<'a> {
     file: &'a mut BufWriter<File>,
     at: u64,

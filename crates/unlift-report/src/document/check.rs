@@ -8,8 +8,7 @@ use crate::document::{Document, Error, Row, SCHEMA};
 
 impl Document {
     /// Checks the rules of the format: the schema, one row per combination, finite numbers,
-    /// percentages between 0 and 100, the same thresholds in every map of a row, lost points that
-    /// add up.
+    /// percentages between 0 and 100, the same thresholds in every map of a row, lost points that add up.
     ///
     /// # Errors
     ///
@@ -96,8 +95,7 @@ fn all_finite<T: Serialize + DeserializeOwned + PartialEq>(
     parts.iter().enumerate().try_for_each(|(i, part)| finite(&format!("{name}[{i}]"), part))
 }
 
-/// Checks that all numbers of a part are finite: JSON has neither NaN nor infinity, so that what is read from its text differs
-/// from it.
+/// Checks that all numbers of a part are finite: JSON has neither NaN nor infinity, so that what is read from its text differs from it.
 fn finite<T: Serialize + DeserializeOwned + PartialEq>(place: &str, part: &T) -> Result<(), Error> {
     match serde_json::from_value::<T>(serde_json::to_value(part)?) {
         Ok(read) if read == *part => Ok(()),

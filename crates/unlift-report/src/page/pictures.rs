@@ -57,8 +57,7 @@ pub enum Marks {
     Points(Vec<Option<[f32; 2]>>),
 }
 
-/// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not
-/// released.
+/// Recovered positions, one per keypoint of [`Picture::keypoints`]; `None` if it is lost or was not released.
 pub type View = ByAttack<Vec<Option<[f32; 2]>>>;
 
 /// A graph of neighborhoods: per keypoint up to [`GRAPH_NEIGHBORS`] neighbors.
@@ -74,8 +73,7 @@ pub struct Graph {
 const BUDGET_BYTES: usize = 3_600_000;
 const BYTES_PER_POINT: usize = 2 * size_of::<u16>();
 
-/// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover
-/// most of the first picture.
+/// Returns the key of the neighborhoods that are shown first: those made by the attacker that recover most of the first picture.
 pub(crate) fn first_choice(pictures: &[Picture], within: f64) -> Option<String> {
     let first = pictures.first()?;
     let own = first.views.iter().filter(|view| !attack::is_oracle(&view.row.neighbors));
@@ -168,8 +166,7 @@ fn ends(segments: &[Option<[[f32; 2]; 2]>], i: usize) -> Vec<Option<[f32; 2]>> {
     [0, 1].map(|end| segment.map(|segment| segment[end])).to_vec()
 }
 
-/// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to
-/// the border.
+/// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to the border.
 fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> impl Iterator<Item = u8> {
     let shares = point.map(|point| [0, 1].map(|c| (point[c] + 0.5) / size[c].max(1) as f32));
     let shares = shares.filter(|shares| shares.iter().all(|share| share.is_finite()));
@@ -186,8 +183,7 @@ fn key(row: &Row) -> String {
     }
 }
 
-/// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px
-/// (blue), the others orange; 3 lost".
+/// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px (blue), the others orange; 3 lost".
 fn recovered(picture: &Picture, view: &View, within: f64) -> (f64, String) {
     let released = picture.released.iter().find(|of| of.scheme == view.row.scheme);
     let is_released = |i: usize| match released.map(|of| &of.marks) {

@@ -27,8 +27,7 @@ pub struct Scene3d {
     pub views: Vec<View>,
 }
 
-/// Recovered positions `(n, 3)`, aligned with [`Scene3d::originals`]; NaN if a point is lost or was
-/// not released.
+/// Recovered positions `(n, 3)`, aligned with [`Scene3d::originals`]; NaN if a point is lost or was not released.
 pub type View = ByAttack<Vec<[f32; 3]>>;
 
 /// Released records of one scheme; a sample is enough for the drawing.
@@ -55,8 +54,7 @@ pub enum Shapes {
     Points(Vec<[f32; 3]>),
 }
 
-/// Maximal number of bytes of the 3D view. With the libraries (about 1.1 MB), tables and curves the page
-/// stays below 10 MB.
+/// Maximal number of bytes of the 3D view. With the libraries (about 1.1 MB), tables and curves the page stays below 10 MB.
 pub const SCENE_BUDGET_BYTES: usize = 6_000_000;
 
 /// Maximal number of lines or planes drawn per scheme.
@@ -75,8 +73,7 @@ const LOST: u8 = u8::MAX;
 /// Errors are stored as `log10(error / first threshold)`, from -3 to 3, in 0..=254.
 const ERROR_DECADES: f32 = 3.0;
 
-/// Returns the maximal number of points for `n_views` views and `n_schemes` schemes within
-/// [`SCENE_BUDGET_BYTES`].
+/// Returns the maximal number of points for `n_views` views and `n_schemes` schemes within [`SCENE_BUDGET_BYTES`].
 pub fn points_within_budget(n_views: usize, n_schemes: usize) -> usize {
     let shapes = (MAX_SHAPES * BYTES_PER_PATCH).max(MAX_SHAPE_POINTS * BYTES_PER_POINT);
     let blocks = (n_views + n_schemes + 2) * BYTES_PER_BLOCK;
@@ -266,11 +263,9 @@ pub struct SceneBox {
 
 impl SceneBox {
     /// Returns the box from the 1st to the 99th percentile of each coordinate, widened by a tenth
-    /// of its longest side. Percentiles exclude far outliers, which would shrink the scene to a
-    /// dot.
+    /// of its longest side. Percentiles exclude far outliers, which would shrink the scene to a dot.
     ///
-    /// Ignores non-finite coordinates; without points it starts from the unit cube about the
-    /// origin.
+    /// Ignores non-finite coordinates; without points it starts from the unit cube about the origin.
     pub fn robust(points: &[[f32; 3]]) -> Self {
         let mut low = [-0.5; 3];
         let mut high = [0.5; 3];
@@ -296,8 +291,7 @@ impl SceneBox {
         Self { low, high, middle }
     }
 
-    /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is
-    /// outside.
+    /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is outside.
     pub fn axis_patch(&self, axis: usize, offset: f32) -> Option<[[f32; 3]; 4]> {
         if !(self.low[axis]..=self.high[axis]).contains(&offset) {
             return None;

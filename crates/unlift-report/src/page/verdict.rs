@@ -34,8 +34,7 @@ pub(crate) fn verdict(results: &Results<'_>) -> Verdict {
 pub(crate) fn cards(results: &Results<'_>) -> Vec<Card> {
     let schemes = results.schemes.iter();
     let mut cards: Vec<Card> = schemes.filter_map(|scheme| card(results, scheme)).collect();
-    // By the share from released data alone, then by the larger other share. The sort is stable, so equal
-    // shares keep the document's order.
+    // By the share from released data alone, then by the larger other share. The sort is stable, so equal shares keep the document's order.
     cards.sort_by(|a, b| {
         let share = |card: &Card, basis| card.finding(basis).map_or(-1.0, |of| of.recovered);
         let others = |card| share(card, Basis::Oracle).max(share(card, Basis::Given));
@@ -193,8 +192,7 @@ pub(crate) struct Card {
     pub scheme: String,
     pub title: String,
     pub rule: &'static str,
-    /// One finding per kind of attack that ran: from released data alone, with given lists, with known
-    /// neighbors.
+    /// One finding per kind of attack that ran: from released data alone, with given lists, with known neighbors.
     pub findings: Vec<Finding>,
     /// What a scheme that publishes bearings shows.
     pub bearings: Option<String>,
@@ -269,8 +267,7 @@ pub(crate) struct Banner {
     pub headline: String,
     /// What the strongest attack recovers, and from which data.
     pub sentence: String,
-    /// What known neighbors would give away under every scheme, so that schemes not named above do not look
-    /// fine.
+    /// What known neighbors would give away under every scheme, so that schemes not named above do not look fine.
     pub every: Option<String>,
     pub unknown: Option<String>,
 }

@@ -4,23 +4,22 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use super::clock::{RowSeconds, Seconds};
-use super::lists::{Kept, Lists};
+use super::lists::{Kept, Lists, Made};
 use super::missing::{NotAudited, add_new, shortened};
 use super::observer::{Cell, Observer};
-use super::plan::{Plan, key_of, oracle_seed};
+use super::plan::{Plan, Variant, key_of, oracle_seed};
 use super::row::{Alone, Row, measure, within};
 use crate::evaluate::{Accuracy, Truth, blind, distinct_weights, evaluate, joined};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle;
 use crate::obfuscate::{Scheme, all, obfuscate};
-use crate::recover::{RecoverOptions, recover};
+use crate::recover::{RecoverOptions, Recovered, Solver, recover};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error, ErrorKind, recover};
 
-/// [Metric](Row::metrics) of an attacker's own lists: the inlier ratio with as many true neighbors
-/// as the lists have records.
+/// [Metric](Row::metrics) of an attacker's own lists: the inlier ratio with as many true neighbors as the lists have records.
 const RATIO_AT_K: &str = "inlier_ratio_at_k";
 
 /// A map or an image with its ground truth.
@@ -56,15 +55,17 @@ struct Run<'a, const D: usize> {
     seed: u64,
 }
 
-/// A finished row with the data that pooling needs.
+/// A finished row with what it was measured from, which pooling needs.
 pub(super) struct Finished<'a> {
     pub(super) row: Row,
-    pub(super) accuracy: &'a Accuracy,
+    pub(super) accuracy: Accuracy,
     pub(super) baseline: &'a Accuracy,
+    /// The secret in the order of the recovered points.
+    pub(super) secret: Cow<'a, Secret>,
     /// Weight of each slot, such that each distinct place counts once.
-    pub(super) weights: &'a [f64],
+    pub(super) weights: Vec<f64>,
     /// Names of the metrics that describe an image as a whole.
-    pub(super) whole: &'a [String],
+    pub(super) whole: Vec<String>,
     /// Number of entries of all lists.
     pub(super) n_listed: usize,
     pub(super) seconds: RowSeconds,
@@ -80,6 +81,14 @@ struct Progress<'a, const D: usize> {
 impl<const D: usize> Progress<'_, D> {
     fn begin(&mut self, what: &str) {
         self.observer.progress(self.done, self.total, what);
+    }
+
+    fn check_stop(&self) -> Result<(), Error> {
+        if self.observer.goes_on() {
+            return Ok(());
+        }
+        let error = Error::new("audit", "to run to the end", "a request to stop");
+        Err(error.of_kind(ErrorKind::Stopped))
     }
 }
 
@@ -99,32 +108,17 @@ fn cells<const D: usize>(
     progress: &mut Progress<'_, D>,
     each: &mut dyn FnMut(Finished<'_>),
 ) -> Result<Vec<NotAudited>, Error> {
-    let (plan, original, scheme) = (run.plan, owned.original, run.scheme.name());
-    let hide = || {
-        let hidden = obfuscate(run.scheme, original, owned.descriptors, &run.key)?;
-        check_laws(run.scheme, original, &run.key, (&hidden.0, &hidden.1))?;
-        Ok::<_, Error>(hidden)
-    };
-    let given = owned.hidden.filter(|_| scheme == plan.schemes[0].name()).map(Cow::Borrowed);
-    let make = || clock.time(|s| &mut s.obfuscate, hide).map(Cow::Owned);
-    let hidden = match given.map_or_else(make, Ok) {
+    let (plan, scheme) = (run.plan, run.scheme.name());
+    let hidden = match clock.time(|s| &mut s.obfuscate, || hide(owned, run)) {
         Err(error) if !owned.may_be_small() => {
             return Ok(vec![NotAudited::new(scheme, None, error)]);
         }
         hidden => hidden.map_err(|error| error.within(scheme))?,
     };
-    let (released, secret) = (&hidden.0, &hidden.1);
-    let baseline = clock.time(|s| &mut s.evaluate, || blind(released, original, secret));
-    // In the plane all lines meet, so records alone contain no information.
-    let mut alone = Vec::new();
-    if plan.records_alone && D == 3 {
-        progress.begin(&format!("{scheme}, records alone"));
-        let attack = || records_alone(&hidden, original, plan, run.seed);
-        alone = clock.time(|s| &mut s.records_alone, attack)?;
-        progress.done += COST;
-    }
+    let release = Release::new((owned, run), &hidden, clock, progress)?;
     let seeds = (run.oracle_seed, run.seed);
     let mut sources = Lists::new(plan.k, run.search, &hidden, seeds, run.kept);
+    let options = RecoverOptions { delta: plan.delta, seed: run.seed, ..RecoverOptions::default() };
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = variant.noise.map_or(variant.by.name(), |noise| noise.name());
@@ -133,7 +127,7 @@ fn cells<const D: usize>(
         let make = || sources.make(variant, owned.may_be_small());
         let made = match clock.time(|s| &mut s.neighbors, make) {
             Err(error) if !owned.may_be_small() => {
-                missing.push(NotAudited::variant(scheme, variant, &error, secret));
+                missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                 continue;
             }
             made => made.map_err(|error| error.within(scheme))?,
@@ -142,86 +136,154 @@ fn cells<const D: usize>(
         if variant.by.source().is_some() {
             progress.done += COST;
         }
-        let options =
-            RecoverOptions { delta: plan.delta, seed: run.seed, ..RecoverOptions::default() };
         for (at, solver) in plan.solvers.iter().enumerate() {
-            if !progress.observer.goes_on() {
-                let error = Error::new("audit", "to run to the end", "a request to stop");
-                return Err(error.of_kind(ErrorKind::Stopped));
-            }
+            progress.check_stop()?;
             progress.begin(&format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name()));
             let started = Instant::now();
-            let recovered = match recover(released, &made.lists, &**solver, &options) {
+            let recovered = match recover(&hidden.0, &made.lists, &**solver, &options) {
                 // The failure of a custom solver costs only its own rows.
                 Err(error) if solver.builtin().is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));
-                    missing.push(NotAudited::variant(scheme, variant, &error, secret));
+                    missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                     continue;
                 }
                 recovered => recovered?,
             };
-            let took = started.elapsed().as_secs_f64();
             // All solvers share the lists. The first solver's row has the time of making them.
-            let making = if at == 0 { making } else { 0.0 };
-            clock.recover += took;
-            let measure =
-                || measure(&recovered, original, secret, Some(&baseline), &plan.thresholds);
-            let (measured, accuracy) = clock.time(|s| &mut s.evaluate, measure)?;
-            let secret = &*joined(&recovered, original, secret);
-            let mut row = Row {
-                scheme: scheme.to_owned(),
-                neighbors: variant.by.name().to_owned(),
-                oracle_noise: variant.noise.map(|noise| noise.name().to_owned()),
-                inlier_ratio: made.ratio,
-                k: made.k,
-                solver: solver.name().to_owned(),
-                ..measured
-            };
-            row.add_alone(alone.iter().cloned());
-            let truth = Truth { original, released, secret };
-            row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
-            row.metrics.extend(truth.bearings(&made.lists));
-            row.metrics.extend(truth.off_record());
-            let mut weights = Vec::new();
-            if owned.may_be_small() {
-                weights = distinct_weights(original, secret);
-                row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
-            }
-            let bare = row.clone();
-            let cell = Cell {
-                name: owned.name,
-                row: &bare,
-                repeat: run.repeat,
-                original,
-                descriptors: owned.descriptors,
-                secret,
-                released,
-                lists: &made.lists,
-                recovered: &recovered,
-                accuracy: &accuracy,
-            };
-            let mut whole = Vec::new();
-            for measure in &plan.measures {
-                let measured = clock.time(|s| &mut s.evaluate, || measure.measure(&cell))?;
-                if measure.is_of_images() {
-                    whole.extend(measured.iter().map(|(name, _)| name.clone()));
-                }
-                row.metrics.extend(measured);
-            }
-            progress.observer.cell(&Cell { row: &row, ..cell });
+            let neighbors = if at == 0 { making } else { 0.0 };
+            let seconds = RowSeconds { neighbors, recover: started.elapsed().as_secs_f64() };
+            clock.recover += seconds.recover;
+            let evaluate = || release.evaluate((variant, &made), &**solver, &recovered);
+            let finished = clock.time(|s| &mut s.evaluate, evaluate)?;
+            progress.observer.cell(&release.cell(&finished, &made, &recovered));
             progress.done += 1;
-            each(Finished {
-                row,
-                accuracy: &accuracy,
-                baseline: &baseline,
-                weights: &weights,
-                whole: &whole,
-                n_listed: made.lists.records().len(),
-                seconds: RowSeconds { neighbors: making, recover: took },
-            });
+            each(Finished { seconds, ..finished });
         }
     }
     Ok(missing)
+}
+
+/// Hides the points under the scheme of `run` and checks the result, or returns what was given.
+fn hide<'a, const D: usize>(
+    owned: &Owned<'a, D>,
+    run: &Run<'_, D>,
+) -> Result<Cow<'a, (Released<D>, Secret)>, Error> {
+    let is_given = run.scheme.name() == run.plan.schemes[0].name();
+    if let Some(given) = owned.hidden.filter(|_| is_given) {
+        return Ok(Cow::Borrowed(given));
+    }
+    let hidden = obfuscate(run.scheme, owned.original, owned.descriptors, &run.key)?;
+    check_laws(run.scheme, owned.original, &run.key, (&hidden.0, &hidden.1))?;
+    Ok(Cow::Owned(hidden))
+}
+
+/// The release of an item under one scheme, with what all its rows share.
+struct Release<'a, const D: usize> {
+    owned: &'a Owned<'a, D>,
+    run: &'a Run<'a, D>,
+    released: &'a Released<D>,
+    secret: &'a Secret,
+    /// Errors of a blind guess.
+    baseline: Accuracy,
+    /// What comes back from the records alone.
+    alone: Vec<Alone>,
+}
+
+impl<'a, const D: usize> Release<'a, D> {
+    fn new(
+        (owned, run): (&'a Owned<'a, D>, &'a Run<'a, D>),
+        hidden: &'a (Released<D>, Secret),
+        clock: &mut Seconds,
+        progress: &mut Progress<'_, D>,
+    ) -> Result<Self, Error> {
+        let (released, secret) = hidden;
+        let guess = || blind(released, owned.original, secret);
+        let baseline = clock.time(|s| &mut s.evaluate, guess);
+        // In the plane all lines meet, so records alone contain no information.
+        let mut alone = Vec::new();
+        if run.plan.records_alone && D == 3 {
+            progress.begin(&format!("{}, records alone", run.scheme.name()));
+            let attack = || records_alone(hidden, owned.original, run.plan, run.seed);
+            alone = clock.time(|s| &mut s.records_alone, attack)?;
+            progress.done += COST;
+        }
+        Ok(Self { owned, run, released, secret, baseline, alone })
+    }
+
+    /// Evaluates what `solver` recovered from the lists `made`, with the measures of the plan.
+    fn evaluate(
+        &self,
+        (variant, made): (&Variant<'_, D>, &Made),
+        solver: &dyn Solver<D>,
+        recovered: &Recovered<D>,
+    ) -> Result<Finished<'_>, Error> {
+        let (original, plan) = (self.owned.original, self.run.plan);
+        let (measured, accuracy) =
+            measure(recovered, original, self.secret, Some(&self.baseline), &plan.thresholds)?;
+        let secret = joined(recovered, original, self.secret);
+        let mut row = Row {
+            scheme: self.run.scheme.name().to_owned(),
+            neighbors: variant.by.name().to_owned(),
+            oracle_noise: variant.noise.map(|noise| noise.name().to_owned()),
+            inlier_ratio: made.ratio,
+            k: made.k,
+            solver: solver.name().to_owned(),
+            ..measured
+        };
+        row.add_alone(self.alone.iter().cloned());
+        let truth = Truth { original, released: self.released, secret: &secret };
+        row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
+        row.metrics.extend(truth.bearings(&made.lists));
+        row.metrics.extend(truth.off_record());
+        let mut weights = Vec::new();
+        if self.owned.may_be_small() {
+            weights = distinct_weights(original, &secret);
+            row.fill_distinct(&accuracy, &self.baseline, &weights, &plan.thresholds);
+        }
+        let mut finished = Finished {
+            row,
+            accuracy,
+            baseline: &self.baseline,
+            secret,
+            weights,
+            whole: Vec::new(),
+            n_listed: made.lists.records().len(),
+            seconds: RowSeconds::default(),
+        };
+        let mut metrics = Vec::new();
+        for measure in &plan.measures {
+            let measured = measure.measure(&self.cell(&finished, made, recovered))?;
+            if measure.is_of_images() {
+                finished.whole.extend(measured.iter().map(|(name, _)| name.clone()));
+            }
+            metrics.extend(measured);
+        }
+        finished.row.metrics.extend(metrics);
+        Ok(finished)
+    }
+
+    fn cell<'c>(
+        &'c self,
+        finished: &'c Finished<'_>,
+        made: &'c Made,
+        recovered: &'c Recovered<D>,
+    ) -> Cell<'c, D> {
+        let Finished { row, accuracy, secret, .. } = finished;
+        let Owned { name, original, descriptors, .. } = *self.owned;
+        let (repeat, released, lists) = (self.run.repeat, self.released, &made.lists);
+        Cell {
+            name,
+            row,
+            repeat,
+            original,
+            descriptors,
+            secret,
+            released,
+            lists,
+            recovered,
+            accuracy,
+        }
+    }
 }
 
 /// Runs and measures all attacks on the records alone. Omits those that place no point of `hidden`.

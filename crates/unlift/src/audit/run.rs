@@ -35,8 +35,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Creates the result of `n_items` items, of which `n_too_small` have at most K points; an error
-    /// without any row.
+    /// Creates the result of `n_items` items, of which `n_too_small` have at most K points; an error without any row.
     pub(super) fn new<const D: usize>(
         plan: &Plan<D>,
         all: Rows,

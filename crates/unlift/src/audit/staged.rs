@@ -1,5 +1,7 @@
 //! Stages of an audit for callers that process one image at a time.
 
+use std::borrow::Cow;
+
 pub use super::plan::{key_of, oracle_seed};
 
 use super::cells::Finished;
@@ -69,18 +71,12 @@ impl Pooled {
         let (mut row, accuracy) =
             measure(recovered, original, secret, baseline.as_ref(), &self.thresholds)?;
         self.with_blind &= baseline.is_some();
-        let baseline = baseline.as_ref().unwrap_or(&accuracy);
+        let baseline = &baseline.unwrap_or_else(|| accuracy.clone());
         let weights = distinct_weights(original, secret);
         row.fill_distinct(&accuracy, baseline, &weights, &self.thresholds);
-        let finished = Finished {
-            row,
-            accuracy: &accuracy,
-            baseline,
-            weights: &weights,
-            whole: &[],
-            n_listed: 0,
-            seconds: RowSeconds::default(),
-        };
+        let (secret, whole, seconds) = (Cow::Borrowed(secret), Vec::new(), RowSeconds::default());
+        let finished =
+            Finished { row, accuracy, baseline, secret, weights, whole, n_listed: 0, seconds };
         let pool = Pool::of(&finished, &self.thresholds);
         match &mut self.pool {
             None => self.pool = Some(pool),

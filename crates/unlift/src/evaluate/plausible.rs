@@ -12,8 +12,7 @@ use crate::truth::{Original, Secret};
 /// map away. Returns this count and the number of compared positions. Without the released map,
 /// distances to the records' true points are compared.
 ///
-/// About half of the positions pass if they are of another map or in another order; of an attack,
-/// even on records alone, clearly more do.
+/// About half of the positions pass if they are of another map or in another order; of an attack, even on records alone, clearly more do.
 pub fn nearer_to_own<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,

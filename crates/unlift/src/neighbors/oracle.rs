@@ -266,8 +266,7 @@ unlift_attack::named! {
     pub enum Noise {
         /// Outliers are uniformly random records that are no true neighbors.
         Uniform = "uniform",
-        /// Outliers are uniformly random among the 2K-th to 10K-th nearest records: in the right
-        /// region, at the wrong place.
+        /// Outliers are uniformly random among the 2K-th to 10K-th nearest records: in the right region, at the wrong place.
         Near = "near",
         /// Nearby points share their outliers, as with similar-looking descriptors.
         ///

@@ -28,8 +28,7 @@ pub struct Room {
     pub cameras: Vec<Camera>,
 }
 
-/// Creates the room of `seed` with `n_points` points. Size (about 5 x 4 x 2.6 m), arrangement,
-/// objects and cameras depend on the seed.
+/// Creates the room of `seed` with `n_points` points. Size (about 5 x 4 x 2.6 m), arrangement, objects and cameras depend on the seed.
 ///
 /// ```
 /// let room = unlift::synthetic::room(0, 1_000);

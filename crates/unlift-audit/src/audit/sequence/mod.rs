@@ -411,8 +411,7 @@ impl Protected<'_> {
 
 const SHOWN: usize = 3;
 
-/// Paints what `row` recovers of a few queries, and adds the pictures to their sheets. Photos that
-/// cannot be used are reported once.
+/// Paints what `row` recovers of a few queries, and adds the pictures to their sheets. Photos that cannot be used are reported once.
 fn paint(
     inversion: &Inversion,
     (hidden, attack): (&Protected<'_>, &Attack<'_>),
