@@ -3,7 +3,7 @@
 //! look like protection, so each doubt is shown beside the verdict, and no gate holds with one.
 
 use unlift::audit::doubts::{
-    NeighborDistances, across, in_unit, least, noise, of_release, short, with_sign,
+    NeighborDistances, across, in_unit, least, noise, of_release, short, unused, with_sign,
 };
 use unlift::audit::{Plan, Row, Threshold};
 use unlift::evaluate::Truth;
@@ -71,25 +71,27 @@ pub(crate) fn doubts(
             100.0 * share
         ));
     }
-    let (shortest, longest) = (short(low), in_unit(high, unit));
+    let (shortest, longest, mut told) = (short(low), in_unit(high, unit), Vec::new());
     for row in rows {
         let of_tiles = tile_rows.iter().flatten().filter(|of_tile| of_tile.is_same_cell(row));
         let mut deltas = std::iter::once(row).chain(of_tiles).map(|row| row.delta);
         let unusual =
             deltas.find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta));
-        let start = format!("{}: delta", row.scheme);
         let of_delta = unusual.map(|delta| in_unit(delta, unit)).map(|delta| {
             format!(
-                "{start}, {delta}, is far from the usual distance to the K-th neighbor, {shortest} to {longest}: recovery may be \
-                 too low (try --delta, or separate parts of the map)"
+                "{}: delta, {delta}, is far from the usual distance to the K-th neighbor, {shortest} to {longest}: recovery may be \
+                 too low (try to audit separate parts of the map)",
+                row.scheme
             )
         });
+        let of_row = of_delta.or_else(|| unused(row));
         // One line per scheme is enough.
-        if !notes.iter().any(|note| note.starts_with(&start)) {
-            notes.extend(of_delta.clone());
+        if of_row.is_some() && !told.contains(&&row.scheme) {
+            told.push(&row.scheme);
+            notes.extend(of_row.clone());
         }
-        all.extend(of_delta.iter().cloned().chain(noise(row, least)));
-        of_rows.push(of_map.clone().or(of_delta));
+        all.extend(of_row.iter().cloned().chain(noise(row, least)));
+        of_rows.push(of_map.clone().or(of_row));
         notes.extend(noise(row, f64::INFINITY));
     }
     notes.dedup();
@@ -163,6 +165,7 @@ pub fn check_thresholds(
     };
     let (nearest, across) = (nearest(points.positions())?, across(points.positions()));
     let option = if typed { "--thresholds" } else { "--scale" };
+    let doubtful = if typed { option } else { "the scale" };
     let times = match unit {
         Unit::KthNeighbor => " times the usual distance to the K-th neighbor",
         Unit::Meter | Unit::Pixel => "",
@@ -194,7 +197,7 @@ pub fn check_thresholds(
     } else if nearest >= UNUSUAL * largest.value {
         remarks.doubts.push(format!(
             "lengths are doubtful: points are {nearest_text} from their nearest neighbors, far more than the largest threshold, \
-             {largest_text}: is {option} right?"
+             {largest_text}: is {doubtful} right?"
         ));
     }
     Ok(())
@@ -243,7 +246,7 @@ mod tests {
         let [notes, doubts] = usual(0.03).unwrap();
         assert!(doubts.is_empty() && notes[0].contains("less than the threshold 0.25 m"));
         let [notes, doubts] = usual(100.0).unwrap();
-        assert!(notes.is_empty() && doubts[0].ends_with("is --scale right?"), "{doubts:?}");
+        assert!(notes.is_empty() && doubts[0].ends_with("is the scale right?"), "{doubts:?}");
         // Thresholds as typed are checked in any unit.
         let of = |labels, typed| checked(20.0, Unit::KthNeighbor, labels, typed);
         for labels in [["1e300", "1e301"], ["1e-300", "1e-9"]] {

@@ -95,10 +95,10 @@ impl Prepared {
         let input = with_sides(input, self.original.reveal());
         let is_within =
             |sides: [f64; 3]| (low..=high).contains(&sides.into_iter().fold(0.0, f64::max));
-        if input.extent_m.is_none_or(is_within) {
+        if input.extent_m.is_some_and(is_within) {
             return Ok(());
         }
-        let found = input.extent().unwrap_or_default();
+        let found = input.extent().unwrap_or("lengths that are not in meters".to_owned());
         bail!("--expect-extent: expected a longest side of {low} to {high} m, found {found}")
     }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use unlift::audit::doubts::unlike_neighbors;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::descriptors::Values;
+use unlift::geometry::vector::sub;
 use unlift::neighbors::Geometric;
 use unlift::obfuscate::obfuscate;
 use unlift::recover::{Builtin, Delta};
@@ -244,20 +245,27 @@ fn of_lines(
     (released, secret)
 }
 
-/// Broken records cannot lead an attack to their points, and large coordinates lose digits: what is then recovered is too little.
+/// Broken records cannot lead an attack to their points, large coordinates lose digits, parallel lines meet nowhere, and lines through
+/// points of others want another attack: what is then recovered is too little.
 #[test]
-fn broken_or_rounded_records_are_no_protection() {
+fn records_that_attacks_cannot_use_are_no_protection() {
     let mut draws = Key::from_seed(5).draws(Stage::Scheme, 2);
     let order = draws.permutation(N);
-    for (broken, shift, expected) in [
-        (0.0, 0.0, ""),
-        (0.2, 0.0, "points are 0.100 m or more away from their own records"),
-        (0.0, 5e6, "so large that 32 bits round them by about"),
+    for (broken, shift, kind, expected) in [
+        (0.0, 0.0, "random", ""),
+        (0.2, 0.0, "random", "points are 0.100 m or more away from their own records"),
+        (0.0, 5e6, "random", "so large that 32 bits round them by about"),
+        (0.0, 0.0, "parallel", "meet nowhere, as parallel lines"),
+        (0.0, 0.0, "through others", "pass through the point of another record"),
     ] {
         let places: Vec<[f64; 3]> = room().iter().map(|p| p.map(|x| x + shift)).collect();
-        let directions: Vec<[f64; 3]> =
-            order.iter().map(|_| [0; 3].map(|_| draws.between(-1.0, 1.0))).collect();
         let mut feet: Vec<[f64; 3]> = order.iter().map(|&at| places[at as usize]).collect();
+        let direction = |at: usize| match kind {
+            "random" => [0; 3].map(|_| draws.between(-1.0, 1.0)),
+            "parallel" => [0.0, 0.0, 1.0],
+            _ => sub(&feet[at], &feet[(at + 1) % N]),
+        };
+        let directions: Vec<[f64; 3]> = (0..N).map(direction).collect();
         let n_broken = (broken * N as f64) as usize;
         feet[..n_broken].iter_mut().flatten().for_each(|x| *x += draws.normal());
         let release = of_lines((&feet, &directions), &order, None);

@@ -387,6 +387,9 @@ pub struct AuditReleasedArgs {
     /// Name of the scheme in the results [default: the value of "scheme" in RELEASED, otherwise "released"]
     #[arg(long, value_name = "NAME", value_parser = unlift_audit::released::check_name, help_heading = "Input")]
     pub name: Option<String>,
+    /// Refuse a map whose longest side is not from LOW to HIGH meters, as with a wrong unit
+    #[arg(long, value_name = "LOW..HIGH", value_parser = values::extent, help_heading = "Input")]
+    pub expect_extent: Option<(f64, f64)>,
     /// Descriptors of the original points, if RELEASED has none: a .npy array with a row per point,
     /// or a file in unlift's format P3DESC01 (docs/formats.md)
     #[arg(long, value_name = "FILE", help_heading = "Input")]

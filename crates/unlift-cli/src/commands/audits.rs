@@ -201,6 +201,9 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
     perform(&args.audit, &args.released, more, |audit| {
         let name = args.name.clone().map_or_else(|| files.scheme_name(), Ok)?;
         let released::Release { mut prepared, hidden } = files.open()?;
+        if let Some(range) = args.expect_extent {
+            prepared.check_extent(range, None)?;
+        }
         let progress = Progress::new(args.audit.quiet);
         let (unit, n_points) = (prepared.original.reveal().unit(), prepared.original.len());
         let usual = Plan::new(unit).for_map(n_points, usize::from(args.k));

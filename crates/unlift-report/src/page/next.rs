@@ -35,11 +35,14 @@ pub(crate) fn steps(results: &Results<'_>) -> Value {
     })
 }
 
-/// Returns a gate that suits the build: today's value of the scheme that leaks least, plus two points.
+/// Returns a gate that suits the build: today's value, plus two points, of the given records or else of the scheme that leaks least.
 fn gate(results: &Results<'_>, cards: &[Card]) -> Option<String> {
     let leak = |card: &Card| card.leak().map_or(f64::INFINITY, |leak| leak.recovered);
+    let given = results.given_records();
     // A gate on a changed scheme needs the options of the change.
-    let plain = cards.iter().filter(|card| !words::is_changed(&card.scheme));
+    let plain = cards.iter().filter(|card| {
+        given.map_or(!words::is_changed(&card.scheme), |given| given == card.scheme)
+    });
     let useful = localizing(results, plain.collect()).into_iter();
     let card = useful.min_by(|a, b| leak(a).total_cmp(&leak(b)))?;
     let (scheme, typed) = (&card.scheme, results.headline);

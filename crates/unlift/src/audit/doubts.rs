@@ -7,7 +7,7 @@ use super::{Row, Threshold};
 use crate::evaluate::{OFF_RECORD, Truth, are_strangers, nearer_to_own, recovered_away};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, median};
-use crate::recover::Recovered;
+use crate::recover::{Recovered, Status};
 use crate::released::Released;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error, PointSet, Unit};
@@ -18,8 +18,8 @@ pub(super) const SAMPLE: usize = 2000;
 /// Tolerated share of points that are farther from their own records than the smallest threshold.
 const STRAY: f64 = 0.01;
 
-/// Usual median distance to the K-th neighbor in its own unit, whatever K the unit was made with.
-const UNIT: [f64; 2] = [0.2, 5.0];
+/// Median distance to the K-th neighbor in its own unit, measured on a sample.
+const UNIT: [f64; 2] = [0.8, 1.25];
 
 /// Quartiles of the distance to the K-th neighbor.
 #[derive(Clone, Copy, Debug)]
@@ -103,6 +103,16 @@ pub fn of_release(
     rounded(truth.usual_rounding(), least, unit)
         .or_else(|| strays(false, &away, least, unit))
         .or_else(|| mistaken_unit(unit, k, middle))
+        .or_else(|| crossings(truth.through_others()))
+}
+
+/// Returns a doubt if records pass through points of others.
+fn crossings((n, of): (usize, usize)) -> Option<String> {
+    let doubt = format!(
+        "released: {n} of {of} records pass through the point of another record: where they meet they give points away, which no \
+         attack here uses"
+    );
+    (n as f64 > STRAY * of as f64).then_some(doubt)
 }
 
 /// Returns the smallest threshold.
@@ -140,7 +150,7 @@ fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
     let (is_usual, found) = ((UNIT[0]..=UNIT[1]).contains(&middle), short(middle));
     let doubt = format!(
         "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, because the file \
-         states lengths in multiples of it, found {found}: thresholds do not have their stated meaning"
+         states lengths in multiples of it, found {found}: thresholds do not have their stated meaning (another --k?)"
     );
     (unit == Unit::KthNeighbor && !is_usual).then_some(doubt)
 }
@@ -270,6 +280,17 @@ pub fn noise(row: &Row, threshold: f64) -> Option<String> {
          others may average the noise away"
     );
     (!threshold.is_finite() || off > NOISE * threshold).then_some(doubt)
+}
+
+/// Returns a doubt if the attack of `row` could not use most of the records, as if all lines are parallel.
+pub fn unused(row: &Row) -> Option<String> {
+    let (n, of) = (row.lost.get(Status::Degenerate.name())?, row.n_points);
+    let doubt = format!(
+        "{}: {n} of {of} points are lost because their records and those of their neighbors meet nowhere, as parallel lines: another \
+         attack may recover them",
+        row.scheme
+    );
+    (2 * n > of).then_some(doubt)
 }
 
 /// Formats three digits, with an exponent where there would be many zeros.

@@ -178,6 +178,24 @@ impl<const D: usize> Truth<'_, D> {
         median_or_zero(own.collect())
     }
 
+    /// Returns how many lines and rays pass exactly through the point of another record, and how many were examined. Where such records
+    /// meet, they give points away. Other families meet other points by chance, and decoys meet all in one.
+    pub fn through_others(&self) -> (usize, usize) {
+        let records = self.released.obfuscation();
+        let is_line = matches!(records, Obfuscation::Lines(_) | Obfuscation::Rays(_));
+        if !is_line || records.is_bearings() {
+            return (0, 0);
+        }
+        let (limit, places) = (self.farthest_for_rounding(), self.places().collect::<Vec<_>>());
+        let meets = |&&(own, place): &&(usize, [f64; D])| {
+            let is_on = |point| distance_to_record(records, own, point) <= limit;
+            let mut others = places.iter().filter(|(other, _)| *other != own);
+            others.any(|(_, point)| is_on(point) && distance(point, &place) > APART * limit)
+        };
+        let examined = places.iter().step_by(places.len().div_ceil(EXAMINED).max(1));
+        (examined.clone().filter(meets).count(), examined.len())
+    }
+
     /// Returns whether most hidden points are off their records as by a scheme's noise: in directions
     /// that do not depend on the place, as those of a wrong scale, frame or order do.
     pub fn is_noise(&self) -> bool {
@@ -234,6 +252,12 @@ impl<const D: usize> Truth<'_, D> {
 fn median_or_zero(mut values: Vec<f64>) -> f64 {
     if values.is_empty() { 0.0 } else { median(&mut values) }
 }
+
+/// Number of records of which [`Truth::through_others`] examines whether they meet other points.
+const EXAMINED: usize = 500;
+
+/// Points nearer to each other than this many roundings are at one place.
+const APART: f64 = 100.0;
 
 /// Distances up to this many roundings are explained by rounding.
 const ROUNDINGS: f64 = 8.0;
