@@ -11,7 +11,7 @@
 //! percentage points. `SCHEME:localization<=MULTIPLE` fails if the error of localization exceeds the unprotected one by more than
 //! this factor. Numbers are compared by value, so `0.1` matches the threshold `0.10`. No name of a solver or a source is a number,
 //! so the first number after the scheme is the threshold. `sequence@5`, `sequence+lists@5` and `tracks@5` are sources:
-//! `dcl2d:sequence@5:10<=20` bounds what comes back from five queries, `olc:again:0.10<=20` what comes back from two releases of a
+//! `dcl2d:sequence@5:10<=20` bounds what comes back from five queries, with their lists if these are used, `olc:again:0.10<=20` what comes back from two releases of a
 //! map.
 
 use std::str::FromStr;
@@ -63,7 +63,10 @@ impl Gate {
         let is_requested = |ratio| row.oracle_noise.is_some() && row.inlier_ratio == ratio;
         self.covers_scheme(&row.scheme)
             && self.solver.is_none_or(|name| name == row.solver)
-            && self.source.as_deref().is_none_or(|name| name == row.neighbors)
+            // Who has several queries also has the lists within each.
+            && self.source.as_deref().is_none_or(|name| {
+                name == row.neighbors || name == row.neighbors.replacen("+lists", "", 1)
+            })
             && self.inlier_ratio.is_none_or(is_requested)
     }
 
@@ -518,6 +521,8 @@ mod tests {
         let by_overlap = Row { neighbors: "overlap".into(), oracle_noise: None, ..alone[0].clone() };
         let by_overlap = &[by_overlap][..];
         let measured = &[Row { oracle_noise: None, ..row("ppl", 0.5, 18.0) }][..];
+        let queries = ["sequence@5", "sequence+lists@5"].map(str::to_owned);
+        let queries = queries.map(|neighbors| Row { neighbors, ..row("cp2d", 0.5, 30.0) });
         let others = &[row("ppl", 1.0, 99.0), row("olc", 0.5, 98.0), row("ppl", 0.5, 18.0)][..];
         for (text, rows, expected) in [
             ("all:0.1<=20", &[row("olc", 1.0, 19.0), row("ppl", 0.5, 21.0), row("cp", 0.1, 3.0)][..], Some(21.0)),
@@ -530,6 +535,8 @@ mod tests {
             ("ppl:ransac:0.10<=20", sources, Some(12.0)),
             ("ppl:overlap:0.10<=20", sources, Some(15.0)),
             ("ppl:ransac:overlap:0.10<=20", sources, None),
+            ("cp2d:sequence@5:0.10<=20", &queries[1..], Some(30.0)),
+            ("cp2d:sequence+lists@5:0.10<=20", &queries[..1], None),
             // What needs no neighborhoods counts unless a solver or the oracle is named.
             ("olc:0.10<=60", alone, Some(66.6)),
             ("olc:overlap:0.10<=60", by_overlap, Some(66.6)),

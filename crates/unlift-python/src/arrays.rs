@@ -47,8 +47,7 @@ fn array<'py>(
     }
     let array = numpy.call_method1("asarray", (given,)).map_err(|error| {
         let py = given.py();
-        // NumPy's errors about uneven rows are of these types; interrupts and lack of memory are
-        // not.
+        // NumPy's errors about uneven rows are of these types; interrupts and lack of memory are not.
         match error.is_instance_of::<PyValueError>(py) || error.is_instance_of::<PyTypeError>(py) {
             true => wrong(name, format!("an array of {what}"), OneLine(error.value(py))),
             false => error,

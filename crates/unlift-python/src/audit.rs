@@ -108,8 +108,7 @@ fn renamed(py: Python<'_>, error: PyErr) -> PyErr {
     raised(format!("{}:{}", option.replace('-', "_"), rest.replace("--", "")))
 }
 
-/// Audits `map` with the options in the dict `options`, and calls `tell` with done, total and the
-/// next item.
+/// Audits `map` with the options in the dict `options`, and calls `tell` with done, total and the next item.
 #[pyfunction]
 pub fn audit(
     py: Python<'_>,
@@ -290,8 +289,7 @@ fn scheme<const D: usize>(
     Ok(scheme)
 }
 
-/// Returns an error for a function with a built-in name, because a report would mistake it for the
-/// built-in one.
+/// Returns an error for a function with a built-in name, because a report would mistake it for the built-in one.
 fn check_own_name(what: &str, name: &str, is_taken: bool) -> PyResult<()> {
     let expected = "functions with a name that unlift does not use";
     if is_taken { Err(wrong(what, expected, name)) } else { Ok(()) }

@@ -68,8 +68,7 @@ impl Released {
         py.detach(|| read_released::<3>(&path)).map(Self::from).map_err(raised)
     }
 
-    /// Writes the released map (`.npz`), as `unlift obfuscate` does. Replaces other files only
-    /// with `force`.
+    /// Writes the released map (`.npz`), as `unlift obfuscate` does. Replaces other files only with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         let write = |path: &Path| of_either!(&self.0, released => write_released(path, released));
@@ -186,8 +185,7 @@ impl Truth {
         Ok(Self { original: Arc::new(original), secret: Arc::new(secret) })
     }
 
-    /// Writes the truth (`.npz`), as `unlift obfuscate` does, readable only by you. Replaces other
-    /// files only with `force`.
+    /// Writes the truth (`.npz`), as `unlift obfuscate` does, readable only by you. Replaces other files only with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         let write = |path: &Path| write_truth(path, &self.original, &self.secret);

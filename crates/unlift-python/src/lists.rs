@@ -19,15 +19,13 @@ use crate::arrays::{numbers, raised, shape_text, to_array, whole, wrong};
 use crate::hidden::{Hidden, of_either, released_of, save};
 use crate::threads;
 
-/// For every hidden point, a list of records that probably hide its nearest neighbors, likeliest
-/// first.
+/// For every hidden point, a list of records that probably hide its nearest neighbors, likeliest first.
 #[pyclass(frozen, module = "unlift")]
 pub struct Neighborhoods(pub Arc<neighbors::Neighborhoods>);
 
 #[pymethods]
 impl Neighborhoods {
-    /// Converts an array `(n_slots, k)` of records of `released`, padded by -1, and optional scores
-    /// of the same shape.
+    /// Converts an array `(n_slots, k)` of records of `released`, padded by -1, and optional scores of the same shape.
     #[new]
     #[pyo3(signature = (released, records, scores=None, *, needs="descriptors"))]
     fn new(
@@ -95,8 +93,7 @@ pub fn needs_of(name: &str) -> PyResult<Needs> {
     }
 }
 
-/// Converts an array `(n_slots, k)`, padded by -1, to lists of `released` with at most `k` entries
-/// each.
+/// Converts an array `(n_slots, k)`, padded by -1, to lists of `released` with at most `k` entries each.
 fn lists_of<const D: usize>(
     released: &released::Released<D>,
     records: &Bound<'_, PyAny>,
@@ -153,8 +150,7 @@ pub fn returned<const D: usize>(
     lists_of(released, given, None, k, needs)
 }
 
-/// Id of the process that has used networks, or 0. Forked children lack the threads of the
-/// networks.
+/// Id of the process that has used networks, or 0. Forked children lack the threads of the networks.
 static NETWORKS_OF: AtomicU32 = AtomicU32::new(0);
 
 /// Returns the source called `name`, with lists of `k` if given.

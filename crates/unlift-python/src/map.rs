@@ -16,8 +16,7 @@ use crate::hidden::{Hidden, Released, Truth};
 use crate::own::{Own, Raised};
 use crate::threads;
 
-/// Points to audit, with optional descriptors. Lengths are in meters with a scale, else in median
-/// distances to the K-th neighbor.
+/// Points to audit, with optional descriptors. Lengths are in meters with a scale, else in median distances to the K-th neighbor.
 #[pyclass(frozen, module = "unlift")]
 pub struct Map {
     pub prepared: Arc<Prepared>,

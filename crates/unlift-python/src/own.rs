@@ -251,8 +251,7 @@ fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> Py
     result.map_err(|text| by.as_cause_of(py, PyAssertionError::new_err(text)))
 }
 
-/// Checks that a scheme hides every point, on its record, by its key alone, and in an order that
-/// reveals nothing.
+/// Checks that a scheme hides every point, on its record, by its key alone, and in an order that reveals nothing.
 ///
 /// It calls the scheme with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up
 /// room, at random, many in one place; with `images`, keypoints `(n, 2)`. A scheme may refuse
@@ -268,8 +267,7 @@ pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>, images: bool) -> 
     })
 }
 
-/// Checks that a source returns a list for every hidden point of `released`, of records of this
-/// map, by its seed alone.
+/// Checks that a source returns a list for every hidden point of `released`, of records of this map, by its seed alone.
 ///
 /// It calls the source three times.
 #[pyfunction]
@@ -283,8 +281,7 @@ pub fn check_source(
     kept(py, &by, move || unlift_testkit::source_laws::<3>(&source, &released))
 }
 
-/// Checks that a solver returns a row for every hidden point of `released`, and the same positions
-/// again.
+/// Checks that a solver returns a row for every hidden point of `released`, and the same positions again.
 ///
 /// It calls the solver three times, the last time with empty lists.
 #[pyfunction]

@@ -21,8 +21,7 @@ pub struct Hiding<const D: usize> {
 }
 
 impl<const D: usize> Hiding<D> {
-    /// Combines records with the points in `hidden`, an array `(n,)`, or `(n, 2)` for lines that
-    /// hide two points each.
+    /// Combines records with the points in `hidden`, an array `(n,)`, or `(n, 2)` for lines that hide two points each.
     fn of(obfuscation: Obfuscation<D>, hidden: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let n = obfuscation.len();
         let (mut slots_per_record, mut rows) = (1, None);

@@ -77,8 +77,7 @@ impl Recovered {
         self.0.unit().name()
     }
 
-    /// Probability that each position lies within `threshold` of the truth `(n_slots,)`, as the
-    /// attacker computes it; None if unknown.
+    /// Probability that each position lies within `threshold` of the truth `(n_slots,)`, as the attacker computes it; None if unknown.
     fn probability_within<'py>(
         &self,
         py: Python<'py>,

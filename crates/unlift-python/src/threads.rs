@@ -3,8 +3,7 @@
 //! Work runs without the interpreter's lock, on threads that end with it. rayon's global pool lasts, but a
 //! forked child would wait for its threads, which it does not have. Python functions run on the thread that
 //! waits for the work, so that an interrupt ends them as any other function. No other thread takes the
-//! interpreter's lock: one that does while the interpreter ends is killed within our frames, which aborts
-//! the process.
+//! interpreter's lock: one that does while the interpreter ends is killed within our frames, which aborts the process.
 
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -35,8 +34,7 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// Runs `call` on the waiting thread. An exception ends the wait. Returns `None` if it did, or if
-    /// the wait has ended before.
+    /// Runs `call` on the waiting thread. An exception ends the wait. Returns `None` if it did, or if the wait has ended before.
     pub fn call<T: Send + 'static>(
         &self,
         call: impl FnOnce(Python<'_>) -> PyResult<T> + Send + 'static,
@@ -139,8 +137,7 @@ impl Progress for Watcher {
     }
 
     fn add(&self, share: f64, what: &str) {
-        // The lock is held during the call, so that calls do not overlap and numbers never
-        // decrease.
+        // The lock is held during the call, so that calls do not overlap and numbers never decrease.
         let mut counted = locked(&self.counted);
         counted.done += share;
         let done = (counted.done + ROUNDING) as usize;

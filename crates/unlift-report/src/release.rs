@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::compare::{Incomparable, different};
-use crate::document::{Document, Input};
+use crate::document::{Document, GateResult, Input};
 use crate::page::verdict::{Finding, Level, card, is_decided, localizes};
 use crate::results::Results;
 
@@ -12,7 +12,7 @@ use crate::results::Results;
 /// descriptors if it has some; `public` the origin of the public descriptors of a protection, as in the options of an audit.
 ///
 /// # Errors
-/// If the document is about another map, unit or descriptors, if only one of both has descriptors, or if the document lacks the scheme.
+/// If the document is about another map, unit or descriptors, if only one of both has descriptors, or if the document lacks the scheme or a gate on it failed.
 pub fn leak(
     document: &Document,
     input: &Input,
@@ -44,6 +44,12 @@ pub fn leak(
     let known = document.options.get("public_descriptors").and_then(Value::as_str);
     if let Some(public) = public.filter(|&public| known != Some(public)) {
         return wrong("public descriptors", public, known.unwrap_or("none"));
+    }
+    let covers = |gate: &&GateResult| {
+        !gate.passed && ["all", scheme].contains(&gate.gate.split([':', '@']).next().unwrap_or(""))
+    };
+    if let Some(gate) = document.gates.iter().find(covers) {
+        return wrong("gates", "an audit whose gates on this scheme held", &gate.gate);
     }
     let results = Results::of(document);
     let Some(card) = card(&results, scheme) else {

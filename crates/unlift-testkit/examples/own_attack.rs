@@ -1,5 +1,4 @@
-//! Audit with a custom source of neighborhoods and a custom solver: `cargo run --release -p
-//! unlift-testkit --example own_attack`.
+//! Audit with a custom source of neighborhoods and a custom solver: `cargo run --release -p unlift-testkit --example own_attack`.
 //!
 //! The source lists the records whose descriptors have the most similar mean. Your source may contain
 //! trained weights as fields. The solver returns, on each line, the median of the nearest points to the
@@ -99,8 +98,7 @@ fn nearest((a, u): ([f32; 3], [f32; 3]), (b, v): ([f32; 3], [f32; 3])) -> f32 {
 }
 
 fn main() -> Result<(), Error> {
-    // Call these in tests of your crate. They check for one list and one result per slot, which do
-    // not depend on the number of threads.
+    // Call these in tests of your crate. They check for one list and one result per slot, which do not depend on the number of threads.
     let (original, released, secret) = unlift_testkit::described_map(&olc::ENTRY, 1_500);
     unlift_testkit::source_laws(&Brightness, &released);
     let lists = Brightness.lists(&released, 20, 0)?;

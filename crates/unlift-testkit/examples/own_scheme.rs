@@ -43,8 +43,7 @@ impl Scheme<3> for Tilted {
 }
 
 fn main() -> Result<(), Error> {
-    // Call this in a test of your crate. It checks that the scheme hides every point, on its
-    // record, and depends only on the key.
+    // Call this in a test of your crate. It checks that the scheme hides every point, on its record, and depends only on the key.
     unlift_testkit::scheme_laws(&Tilted { most: 0.5 });
 
     let room = Original::new(PointSet::try_new(synthetic::room(1, 3_000).points, Unit::Meter)?);

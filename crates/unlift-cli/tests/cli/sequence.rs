@@ -61,6 +61,7 @@ fn keypoints_come_back_by_the_number_of_queries_of_images_that_fit() {
     let (stdout, stderr) = place.ends(line, 0);
     assert!(stderr.contains("6 images: no rows for [9] queries"), "{stderr}");
     assert!(stdout.contains("After 2 queries 0.0 %, "), "{stdout}");
+    assert!(stdout.contains("Not tried: neighbors by descriptors within"), "{stdout}");
     let document = place.json("a/audit.json");
     let share = |scheme, neighbors: &str| recovered(row(&document, scheme, neighbors), "5");
     for by in ["sequence", "tracks"] {

@@ -191,6 +191,17 @@ fn a_release_is_made_as_it_was_audited() {
         assert!(told.contains(&leak), "{leak} in {told}");
         assert_same(row, &staged(&place, "r", "similarity", 7));
     }
+    place.ends(
+        &format!(
+            "audit map {map} --no-records-alone --schemes olc --gate olc:joint:0.10<=0 --out b"
+        ),
+        1,
+    );
+    let failed = format!("--schemes olc {map} --audit b/audit.json --out x");
+    place.refuses(
+        "obfuscate",
+        &[(&failed, 3, "gates on this scheme held, found olc:joint:0.10<=0")],
+    );
     place.write("other.csv", place.text("room.csv").replacen("0.", "1.", 1));
     for (line, expected) in [
         (map.replace("room", "other"), "a/audit.json: hash of the map or images: expected "),

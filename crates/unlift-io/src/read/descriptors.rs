@@ -120,7 +120,8 @@ fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
         let place = format!("image {}", quoted(&image.name));
         let at = features.names().binary_search_by(|name| name.as_bytes().cmp(&image.name));
         let Ok(at) = at else {
-            return Err(Error::new(path, place, "this image of the model", "no such image"));
+            let found = format!("no such image among {}", features.names().len());
+            return Err(Error::new(path, place, "this image of the model", found));
         };
         let found = features.get(at)?;
         if found.keypoints.len() as u64 != image.n_points2d {

@@ -21,10 +21,15 @@ pub fn text_table(document: &Document) -> String {
     let Verdict { banner, cards, .. } = verdict::verdict(results);
     let extent = document.input.extent().map(|extent| format!(" ({extent})"));
     let extent = extent.unwrap_or_default();
+    let lines = |sentences: Vec<String>| {
+        let lines =
+            sentences.into_iter().chain(results.doubts()).chain(verdict::not_tried(results));
+        lines.collect::<Vec<_>>().join("\n")
+    };
     let (reasons, figures) = if results.is_sequence() {
-        (verdict::sequence_sentences(results).join("\n"), sequence(results))
+        (lines(verdict::sequence_sentences(results)), sequence(results))
     } else if results.is_again() {
-        (verdict::again_sentences(results).join("\n"), again(results))
+        (lines(verdict::again_sentences(results)), again(results))
     } else {
         (banner.sentence, by_scheme(results, &cards))
     };

@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use unlift::audit::Interval;
 
-use crate::attack::{self, Basis};
+use crate::attack::{self, Basis, SEQUENCE_AND_LISTS};
 use crate::document::{Bound, BreakEven, Localization, Row};
 use crate::results::Results;
 use crate::words;
@@ -405,20 +405,32 @@ fn best(results: &Results<'_>) -> &'static [&'static str] {
     if results.is_of_images() { &[attack::BEST, "learned"] } else { &[attack::BEST] }
 }
 
+/// Returns true if lists within each query were used, too.
+fn has_lists(results: &Results<'_>) -> bool {
+    results.rows.iter().any(|row| row.neighbors.starts_with(SEQUENCE_AND_LISTS))
+}
+
 /// Returns true if a small leak of `scheme`, or of any scheme, says something: the best attack was tried, and no figure is doubtful.
 pub(crate) fn is_decided(results: &Results<'_>, scheme: Option<&str>) -> bool {
     // Two releases are not attacked by lists within one of them.
-    let is_best = uses(results, scheme, best(results)) && !results.is_again();
+    let is_best = match results.is_sequence() {
+        true => has_lists(results),
+        false => uses(results, scheme, best(results)) && !results.is_again(),
+    };
     is_best && results.document.doubts.is_empty()
 }
 
 /// Returns which kinds of attacks on released data were not tried.
-fn not_tried(results: &Results<'_>) -> Option<String> {
+pub(crate) fn not_tried(results: &Results<'_>) -> Option<String> {
     if results.is_again() {
         return Some("Not tried: attacks on one release alone (unlift audit map).".to_owned());
     }
     if results.is_of_releases() || results.rows.is_empty() {
-        return None;
+        let lacks_lists = results.is_sequence() && !has_lists(results);
+        return lacks_lists.then(|| {
+            "Not tried: neighbors by descriptors within each query (--neighbors descriptors)."
+                .to_owned()
+        });
     }
     let images = results.is_of_images();
     let alone = images || results.rows.iter().any(|row| row.records_alone_percent.is_some());

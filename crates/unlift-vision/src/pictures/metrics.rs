@@ -134,8 +134,7 @@ impl Lpips {
         Ok(Self { network: Network::load(MODEL)? })
     }
 
-    /// Returns the distance of two pictures: 0 for equal ones, about 0.7 for unrelated ones. Uses
-    /// about a kilobyte of memory per pixel.
+    /// Returns the distance of two pictures: 0 for equal ones, about 0.7 for unrelated ones. Uses about a kilobyte of memory per pixel.
     ///
     /// # Errors
     /// If the pictures differ in size, or a side has less than 16 pixels.

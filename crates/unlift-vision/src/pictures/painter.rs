@@ -14,8 +14,7 @@ use super::{
 use crate::features::{ColorImage, halved};
 use crate::network::DescriptorKind;
 
-/// Points with a lower probability of being near their recovered place are omitted: they would
-/// paint wrong content over correct content.
+/// Points with a lower probability of being near their recovered place are omitted: they would paint wrong content over correct content.
 const LEAST: f64 = 0.2;
 const BASELINE: &str = "_baseline";
 /// Limit of PSNR, which is infinite for equal pictures.
@@ -226,8 +225,7 @@ pub fn needed(descriptors: Option<&Descriptors>) -> Result<&Descriptors, Error> 
     descriptors.ok_or_else(|| Error::new("pictures", "descriptors", "none"))
 }
 
-/// Returns the descriptors of recovered points, in their order. Lists made from descriptors have
-/// their order, so no assignment is needed.
+/// Returns the descriptors of recovered points, in their order. Lists made from descriptors have their order, so no assignment is needed.
 fn assigned<'a, const D: usize>(
     released: &'a Released<D>,
     recovered: &Recovered<D>,
@@ -240,8 +238,7 @@ fn assigned<'a, const D: usize>(
     })
 }
 
-/// Returns the trusted points inside a view's image and their weights: 0 for hidden points. A point
-/// with weight 0 does not hide others.
+/// Returns the trusted points inside a view's image and their weights: 0 for hidden points. A point with weight 0 does not hide others.
 fn in_sight(
     view: &View,
     positions: &[Option<[f64; 3]>],

@@ -24,8 +24,7 @@ const PATCH: usize = 9;
 /// Keypoints that are described at a time: 13 MB.
 const BATCH: usize = 1024;
 
-/// Extracts the features of an image with the network `aliked-n16rot`. Uses about 330 bytes of
-/// memory per pixel after downsizing.
+/// Extracts the features of an image with the network `aliked-n16rot`. Uses about 330 bytes of memory per pixel after downsizing.
 ///
 /// # Errors
 /// If an option is out of range, or the network has other inputs or outputs.

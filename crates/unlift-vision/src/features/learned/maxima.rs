@@ -11,8 +11,7 @@ pub(crate) struct Scores {
 
 impl Scores {
     /// Returns the positions `(x, y)` of the maxima that `options` request, the best first, equal
-    /// ones in reading order. None is within `radius` pixels of the border or, in x and y, of
-    /// another one.
+    /// ones in reading order. None is within `radius` pixels of the border or, in x and y, of another one.
     ///
     /// Three passes, as in the authors' code: each maximum suppresses its neighborhood, then again.
     pub(crate) fn maxima(&self, radius: usize, options: &Extraction) -> Vec<[usize; 2]> {

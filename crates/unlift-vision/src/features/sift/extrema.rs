@@ -213,8 +213,7 @@ impl Shape {
         solve(self.curvature, self.slope.map(|slope| -slope)).unwrap_or([0.0; 3])
     }
 
-    /// Returns `(r + 1)^2 / r` for a ratio `r` of principal curvatures, negative for opposite
-    /// signs.
+    /// Returns `(r + 1)^2 / r` for a ratio `r` of principal curvatures, negative for opposite signs.
     fn roundness(&self) -> f64 {
         let [[xx, xy, _], [_, yy, _], _] = self.curvature;
         (xx + yy) * (xx + yy) / (xx * yy - xy * xy)

@@ -46,8 +46,7 @@ pub struct Features {
     pub descriptors: Vec<[u8; descriptor::LENGTH]>,
 }
 
-/// SIFT as COLMAP extracts it on a CPU: from the same pixels, keypoints agree within a thousandth
-/// of a pixel, and some bytes differ by one.
+/// SIFT as COLMAP extracts it on a CPU: from the same pixels, keypoints agree within a thousandth of a pixel, and some bytes differ by one.
 ///
 /// Threads can share it: each call takes a set of buffers, which is reused. A set needs 24 bytes
 /// per pixel of the doubled image: 30 MB for 640 x 480, 740 MB for 3200 x 2400 (larger images are
