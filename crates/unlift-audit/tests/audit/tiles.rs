@@ -1,5 +1,4 @@
-//! A map in tiles: each tile is audited as a map of its own, and the page shows which one leaks
-//! most.
+//! A map in tiles: each tile is audited as a map of its own, and the page shows which one leaks most.
 
 use std::sync::Arc;
 

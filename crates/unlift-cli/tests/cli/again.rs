@@ -2,8 +2,7 @@
 
 use crate::common::{Place, recovered, row, rows};
 
-/// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both.
-/// Returns the points of the first.
+/// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both. Returns the points of the first.
 fn maps() -> (Place, Vec<[f64; 3]>) {
     // Numbers in [0, 1) for any index.
     let random = |at: usize| (at as f64 * 0.754_877_666 + 0.1).fract();

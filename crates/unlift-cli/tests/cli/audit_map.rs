@@ -60,8 +60,7 @@ fn descriptors_beside_the_model_are_used_unless_only_the_oracle_is_wanted() {
     }
 }
 
-/// A share-safe report contains neither the name nor a hash of the map, which would confirm a
-/// guess.
+/// A share-safe report contains neither the name nor a hash of the map, which would confirm a guess.
 #[test]
 fn a_shareable_report_names_nothing() {
     let place = Place::with_room(200);

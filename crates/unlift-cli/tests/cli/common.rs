@@ -134,8 +134,7 @@ impl Place {
         stderr
     }
 
-    /// Runs lines of a command, each of which must end with its code, an empty stdout and this text
-    /// on stderr.
+    /// Runs lines of a command, each of which must end with its code, an empty stdout and this text on stderr.
     pub fn refuses(&self, command: &str, lines: &[(&str, i32, &str)]) {
         for (line, code, expected) in lines {
             let told = self.complains(&format!("{command} {line}"), *code);

@@ -1,5 +1,4 @@
-//! The stages, one after another: they give the results of an audit, and refuse files of another
-//! map.
+//! The stages, one after another: they give the results of an audit, and refuse files of another map.
 
 use std::fs;
 
@@ -51,8 +50,7 @@ fn assert_same(row: &Value, staged: &Value) {
     assert_eq!(Value::Object(expected), *staged, "{row}");
 }
 
-/// With the same `--seed` everywhere, `evaluate` prints the row of the audit, whatever the scheme and
-/// the source of lists.
+/// With the same `--seed` everywhere, `evaluate` prints the row of the audit, whatever the scheme and the source of lists.
 #[test]
 fn the_stages_print_the_row_of_the_audit() {
     let place = Place::with_described_room(400, 128);

@@ -1,6 +1,5 @@
 //! Licenses, registry and duplicates of the dependencies. This is a test, so that it needs no other
-//! program. Advisories change while code does not: check them by `cargo audit` or `cargo deny check
-//! advisories`, where there is a network.
+//! program. Advisories change while code does not: check them by `cargo audit` or `cargo deny check advisories`, where there is a network.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -8,8 +7,7 @@ use std::process::Command;
 const ALLOWED: &str = "0BSD, Apache-2.0, Apache-2.0 WITH LLVM-exception, BSD-2-Clause, BSD-3-Clause, CC0-1.0, MIT, \
     Unicode-3.0, Unlicense, Zlib";
 
-/// Crates with two versions, because dependencies require different ones. Check a new one before
-/// you add it.
+/// Crates with two versions, because dependencies require different ones. Check a new one before you add it.
 const TWICE: &str = "base64 block-buffer cpufeatures crypto-common digest getrandom glam hashbrown miniz_oxide num-bigint \
     rand rand_core syn";
 

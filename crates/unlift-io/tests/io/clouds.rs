@@ -1,5 +1,4 @@
-//! Tests point clouds: PLY, tables and arrays in every form, files that deviate from their format
-//! in common ways, and exports.
+//! Tests point clouds: PLY, tables and arrays in every form, files that deviate from their format in common ways, and exports.
 
 use std::fs;
 

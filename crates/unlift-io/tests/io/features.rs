@@ -130,8 +130,7 @@ fn databases_come_in_the_same_convention() {
     }
 }
 
-/// The name and the shape of an array of floats, and the step between its values; without one, wide
-/// integers.
+/// The name and the shape of an array of floats, and the step between its values; without one, wide integers.
 type Array = (&'static str, &'static [u64], Option<f32>);
 
 const KEYPOINTS: Array = ("keypoints", &[3, 2], Some(1.0));

@@ -1,5 +1,4 @@
-//! Tests malformed maps: the exact error line of each, and no panic for any cut or changed byte of
-//! any input.
+//! Tests malformed maps: the exact error line of each, and no panic for any cut or changed byte of any input.
 
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};

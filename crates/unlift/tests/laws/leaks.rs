@@ -9,8 +9,7 @@ use crate::maps::*;
 
 const KEYS: u64 = 60;
 const POINTS: usize = 150;
-/// Limit of the mean over all keys in standard deviations. Chance exceeds it in 6 of 10 million
-/// cases; there are some hundred statistics.
+/// Limit of the mean over all keys in standard deviations. Chance exceeds it in 6 of 10 million cases; there are some hundred statistics.
 const MAX_DEVIATIONS: f64 = 5.0;
 
 /// Correlations of released columns with ground truth, over many keys: their sum and number.

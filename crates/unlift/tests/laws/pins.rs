@@ -1,6 +1,5 @@
 //! Golden bytes: a change here changes every published figure. They hold on every platform, because
-//! only exact operations and a portable logarithm are used. After an intended change, copy the
-//! output of the failing test.
+//! only exact operations and a portable logarithm are used. After an intended change, copy the output of the failing test.
 
 use unlift::obfuscate::SCHEMES;
 

@@ -51,8 +51,7 @@ fn fixed(a: &str, b: &str) -> std::ops::RangeInclusive<f64> {
         ("plane", "plane") => 0.0..=0.0,
         // A third of the points are swapped along the axis of their plane.
         ("plane", "cp") | ("cp", "plane") => 25.0..=42.0,
-        // Both releases compute the same two centers, so that half of the rays are the same; the grid chooses the same center
-        // again.
+        // Both releases compute the same two centers, so that half of the rays are the same; the grid chooses the same center again.
         ("ray", "ray") | ("ray", "ray-voxel") | ("ray-voxel", "ray") => 42.0..=58.0,
         ("ray-voxel", "ray-voxel") => 0.0..=0.0,
         _ => 99.0..=100.0,

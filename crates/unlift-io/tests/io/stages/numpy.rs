@@ -89,8 +89,7 @@ fn the_snippets_of_the_document_run() {
     assert!(printed.starts_with("80% of 10 lines, ") && printed.ends_with(" m\n"), "{printed}");
 }
 
-/// NumPy rewrites files of every kind and family: compressed, in Fortran's order, big-endian and
-/// wider. The values stay.
+/// NumPy rewrites files of every kind and family: compressed, in Fortran's order, big-endian and wider. The values stay.
 #[test]
 fn numpy_writes_the_same_values_in_every_form() {
     let folder = tempfile::tempdir().unwrap();
