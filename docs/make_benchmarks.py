@@ -5,9 +5,9 @@
 
 or some sections of them, named after the folder; each prints on stderr how long it took (two idle cores):
 
-    accuracy    6 min    four scenes, three solvers, three seeds; also the README's table and the section on confidence
+    accuracy   20 min    four scenes, three solvers, three seeds; also the README's table and the section on confidence
     noise       1 min    noise models of the oracle
-    own         6 min    an attacker's own sources
+    own         5 min    an attacker's own sources
     alone       1 min    attacks on the records alone
     large       5 min    the cost of 700,000 points
     images     20 min    keypoints of photos
