@@ -14,8 +14,7 @@ fn main() {
     println!("cargo::rustc-env=UNLIFT_VERSION={named}");
 }
 
-/// Returns the commit from `UNLIFT_COMMIT`, else from git. Debug builds skip git, because each new
-/// commit would link them again.
+/// Returns the commit from `UNLIFT_COMMIT`, else from git. Debug builds skip git, because each new commit would link them again.
 fn commit() -> Option<String> {
     let given = std::env::var("UNLIFT_COMMIT").ok().filter(|commit| !commit.is_empty());
     if given.is_some() || std::env::var("PROFILE").ok()? != "release" {

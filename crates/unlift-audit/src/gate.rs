@@ -325,10 +325,7 @@ pub fn check_gates(
         }
         let Some(wrong) = gate.not_in(tried) else { continue };
         let error = Error::request(format!("--gate {typed}: {wrong}"));
-        let advice = match points {
-            Some(_) => "--scale and --thresholds, which change them",
-            None => "--thresholds, which changes them",
-        };
+        let advice = "--thresholds, which changes them (for a map, --scale, too)";
         return Err(if wrong.starts_with(THRESHOLD) { error.advise(advice) } else { error });
     }
     let least = gates.iter().min_by(|a, b| a.threshold.total_cmp(&b.threshold));

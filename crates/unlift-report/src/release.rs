@@ -46,10 +46,15 @@ pub fn leak(
         return wrong("public descriptors", public, known.unwrap_or("none"));
     }
     let covers = |gate: &&GateResult| {
-        !gate.passed && ["all", scheme].contains(&gate.gate.split([':', '@']).next().unwrap_or(""))
+        !gate.passed
+            && ["all", scheme].contains(&gate.gate.split([':', '@']).next().unwrap_or("").trim())
     };
     if let Some(gate) = document.gates.iter().find(covers) {
-        return wrong("gates", "an audit whose gates on this scheme held", &gate.gate);
+        return wrong(
+            "gates",
+            "an audit whose gates on this scheme held (all: on every scheme)",
+            &gate.gate,
+        );
     }
     let results = Results::of(document);
     let Some(card) = card(&results, scheme) else {

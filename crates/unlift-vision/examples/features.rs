@@ -1,10 +1,8 @@
-//! Extracts features of photos and prints the time: `features IMAGE... [--type sift|aliked]
-//! [--out FILE] [--threads N] [--max-features N]`.
+//! Extracts features of photos and prints the time: `features IMAGE... [--type sift|aliked] [--out FILE] [--threads N] [--max-features N]`.
 //!
 //! FILE contains for each photo, in order and in little-endian: u32 n, u32 bytes per descriptor,
 //! then n times x, y, scale and orientation as f32, then n descriptors. The corner of the first
-//! pixel is at (0, 0). A SIFT descriptor is 128 bytes. An ALIKED descriptor is 128 f32, and scale
-//! and orientation are 0.
+//! pixel is at (0, 0). A SIFT descriptor is 128 bytes. An ALIKED descriptor is 128 f32, and scale and orientation are 0.
 
 use std::error::Error;
 use std::fs::File;

@@ -1,6 +1,5 @@
 //! Makes the training data of the networks of `learned` from photos: `training_crops OUT LIST
-//! [--type sift|aliked|superpoint] [--seed N] [--sizes 128,256,384] [--share 1.0] [--max-image-size
-//! N] [--whole N]`.
+//! [--type sift|aliked|superpoint] [--seed N] [--sizes 128,256,384] [--share 1.0] [--max-image-size N] [--whole N]`.
 //!
 //! LIST names a photo per line. A crop is `n` neighboring keypoints of one photo. OUT gets a folder
 //! per `n` with files to which crops are appended, little-endian: `descriptors.u8`

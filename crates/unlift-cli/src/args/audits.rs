@@ -218,8 +218,7 @@ pub struct AuditMapArgs {
     #[command(flatten)]
     pub map: MapArgs,
     /// Refuse a map whose longest side is not from LOW to HIGH meters, as with a wrong --scale
-    #[arg(long, value_name = "LOW..HIGH", value_parser = values::extent, requires = "scale",
-          help_heading = "Input")]
+    #[arg(long, value_name = "LOW..HIGH", value_parser = values::extent, requires = "scale", help_heading = "Input")]
     pub expect_extent: Option<(f64, f64)>,
     /// Run a small audit: the schemes olc (a random line through each point) and ppl (one line
     /// through two points), with the oracle at inlier ratio 0.5 and, if there are descriptors, the source similarity
@@ -230,8 +229,7 @@ pub struct AuditMapArgs {
     #[arg(long, conflicts_with = "quick", help_heading = "Attack")]
     pub full: bool,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     #[command(flatten)]
     pub solvers: SolverArgs,
@@ -248,8 +246,7 @@ pub struct AuditMapArgs {
     pub protect: ProtectArgs,
     /// Cut a large map into tiles of at most N points and audit each tile as a separate map. This
     /// needs the memory of one tile, and the report shows which tiles leak most. Recommended beyond a few million points
-    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Attack",
-          conflicts_with_all = ["invert", "localize"])]
+    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Attack", conflicts_with_all = ["invert", "localize"])]
     pub tile_points: Option<NonZeroUsize>,
     #[command(flatten)]
     pub paint: PaintArgs,
@@ -264,8 +261,7 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "PHOTOS|FEATURES", help_heading = "Result")]
     pub localize: Option<PathBuf>,
     /// Hold out one image of N
-    #[arg(long, value_parser = values::count, value_name = "N", default_value = "10",
-          help_heading = "Result", requires = "localize")]
+    #[arg(long, value_parser = values::count, value_name = "N", default_value = "10", help_heading = "Result", requires = "localize")]
     pub hold_out: NonZeroUsize,
     #[command(flatten)]
     pub audit: AuditArgs,
@@ -282,21 +278,17 @@ pub struct AuditImagesArgs {
     #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
     pub max_images: Option<NonZeroUsize>,
     /// Number of nearest neighbors of a keypoint that count as true neighbors (K)
-    #[arg(long, value_name = "K", default_value = "20", help_heading = "Input",
-          value_parser = value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "K", default_value = "20", help_heading = "Input", value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: lines2d,cp2d,dcl2d]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     /// Source of the attacker's lists of neighbors; repeatable: oracle, descriptors, similarity,
     /// overlap or learned (see unlift audit map) [default: descriptors, if there are any, and oracle]
-    #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source, help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
     /// Recovery methods, separated by commas or repeated: joint, consensus or ransac (see unlift audit map) [default: joint]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver, help_heading = "Attack")]
     pub solver: Vec<Builtin>,
     #[command(flatten)]
     pub oracle: OracleArgs,
@@ -321,8 +313,7 @@ pub struct AuditSequenceArgs {
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale, help_heading = "Input")]
     pub scale: Option<f64>,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: lines2d,cp2d,dcl2d]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     /// Numbers of queries that the attacker watches, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::queries,
@@ -330,18 +321,15 @@ pub struct AuditSequenceArgs {
     pub queries: Vec<usize>,
     /// Also combine the queries with lists of neighbors within each of them, which this source
     /// makes: descriptors, similarity, overlap or learned (see unlift audit map)
-    #[arg(long, value_name = "SOURCE", value_parser = values::own_image_source,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "SOURCE", value_parser = values::own_image_source, help_heading = "Attack")]
     pub neighbors: Option<Named>,
     /// Also audit every scheme after this change to the descriptors of each query: noise:DEVIATION
     /// or drop:SHARE (see unlift audit map); repeat for alternatives
-    #[arg(long, value_name = "STEPS", value_parser = values::image_mitigation,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "STEPS", value_parser = values::image_mitigation, help_heading = "Attack")]
     pub mitigate: Vec<Mitigation>,
     /// Add an error to each pose, as localization has it: CM centimeters in a random direction and
     /// a turn by DEG degrees [default: the poses of MODEL]
-    #[arg(long, value_name = "perturbed:CM,DEG", value_parser = values::poses,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "perturbed:CM,DEG", value_parser = values::poses, help_heading = "Attack")]
     pub poses: Option<(f64, f64)>,
     #[command(flatten)]
     pub paint: PaintArgs,
@@ -366,8 +354,7 @@ pub struct AuditAgainArgs {
     pub descriptors: Vec<PathBuf>,
     /// Schemes of both releases, separated by commas: olc hides both under olc, olc/cp the second
     /// one under cp [default: every scheme with itself]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme_pair,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme_pair, help_heading = "Attack")]
     pub schemes: Vec<[&'static Entry; 2]>,
     /// Skip the baseline "records alone", the best attack on the first release only, without descriptors. It takes most of the time
     #[arg(long, help_heading = "Attack")]
@@ -395,12 +382,10 @@ pub struct AuditReleasedArgs {
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub descriptors: Option<PathBuf>,
     /// Number of nearest neighbors of a point that count as true neighbors (K)
-    #[arg(long, value_name = "K", default_value = "50", help_heading = "Input",
-          value_parser = value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "K", default_value = "50", help_heading = "Input", value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
     /// Also audit these schemes of unlift on the same points, separated by commas
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
-          help_heading = "Attack")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     #[command(flatten)]
     pub solvers: SolverArgs,

@@ -32,8 +32,7 @@ pub struct ObfuscateArgs {
     /// A map, any PATH of unlift audit map. Or images: a folder of photos, hloc's features.h5, or a COLMAP database.db
     pub path: PathBuf,
     /// Scheme that hides the points (unlift schemes lists them). Schemes for images need images
-    #[arg(long = "schemes", alias = "scheme", value_name = "SCHEME",
-          value_parser = values::by(unlift::obfuscate::scheme))]
+    #[arg(long = "schemes", alias = "scheme", value_name = "SCHEME", value_parser = values::by(unlift::obfuscate::scheme))]
     pub scheme: &'static Entry,
     /// Folder for released.npz and truth.npz; other files in it stay
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
@@ -41,8 +40,7 @@ pub struct ObfuscateArgs {
     #[command(flatten)]
     pub map: MapArgs,
     /// Change the map before the scheme hides it, as unlift audit map --mitigate does
-    #[arg(long, value_name = "STEPS", value_parser = values::by(Mitigation::parse),
-          conflicts_with = "protect_descriptors")]
+    #[arg(long, value_name = "STEPS", value_parser = values::by(Mitigation::parse), conflicts_with = "protect_descriptors")]
     pub mitigate: Option<Mitigation>,
     /// Release protected descriptors, as unlift audit map --protect-descriptors audits them
     #[arg(long, value_name = "RULE", value_parser = values::by(Protection::parse))]
@@ -71,8 +69,7 @@ pub struct NeighborsArgs {
     #[arg(long, value_name = "TRUTH", requires = "inlier_ratio")]
     pub truth: Option<PathBuf>,
     /// For the oracle: fraction of each list that consists of true nearest neighbors, from 0 to 1: round(RATIO x K) of K entries
-    #[arg(long = "inlier-ratios", alias = "inlier-ratio", value_name = "RATIO",
-          value_parser = values::ratio, requires = "truth")]
+    #[arg(long = "inlier-ratios", alias = "inlier-ratio", value_name = "RATIO", value_parser = values::ratio, requires = "truth")]
     pub inlier_ratio: Option<f64>,
     /// For the oracle: wrong entries of the lists, uniform, near or clustered (see unlift audit map)
     #[arg(long, value_name = "MODEL", value_parser = values::by(Noise::from_name), default_value = "uniform")]

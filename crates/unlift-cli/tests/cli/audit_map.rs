@@ -33,7 +33,7 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ("room.csv --scale 1 --expect-extent 20..50", 2, "a longest side of 20 to 50 m, found "),
         ("room.csv --scale 1 --expect-extent 9", 2, "expected LOW..HIGH in meters"),
         // The gate has a threshold in meters, but the audit has no scale.
-        ("room.csv --gate olc:0.10<=20", 2, "expected one of 1.0, 2.5, found 0.1\n  try: --scale and --thresholds, which change them"),
+        ("room.csv --gate olc:0.10<=20", 2, "expected one of 1.0, 2.5, found 0.1\n  try: --thresholds, which changes them"),
         ("room.csv --neighbors overlap", 2, "--neighbors overlap: expected descriptors (--descriptors FILE), found none"),
         ("room.csv --neighbors overlap --descriptors d.bin --inlier-ratios 0.5", 2, overlap),
         ("room.csv --neighbors overlap --descriptors d.bin --oracle-noise near", 2, overlap),

@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use unlift::audit::Interval;
 
-use crate::attack::{self, Basis, SEQUENCE_AND_LISTS};
+use crate::attack::{self, Basis};
 use crate::document::{Bound, BreakEven, Localization, Row};
 use crate::results::Results;
 use crate::words;
@@ -405,9 +405,10 @@ fn best(results: &Results<'_>) -> &'static [&'static str] {
     if results.is_of_images() { &[attack::BEST, "learned"] } else { &[attack::BEST] }
 }
 
-/// Returns true if lists within each query were used, too.
+/// Returns true if the best lists within each query were used, too.
 fn has_lists(results: &Results<'_>) -> bool {
-    results.rows.iter().any(|row| row.neighbors.starts_with(SEQUENCE_AND_LISTS))
+    let lists = results.document.options.get("lists").and_then(|by| by.as_str());
+    lists.is_some_and(|by| best(results).contains(&by))
 }
 
 /// Returns true if a small leak of `scheme`, or of any scheme, says something: the best attack was tried, and no figure is doubtful.

@@ -55,7 +55,7 @@ struct Run<'a, const D: usize> {
     seed: u64,
 }
 
-/// A finished row with what it was measured from, which pooling needs.
+/// A finished row with what it was measured from.
 pub(super) struct Finished<'a> {
     pub(super) row: Row,
     pub(super) accuracy: Accuracy,
@@ -240,16 +240,10 @@ impl<'a, const D: usize> Release<'a, D> {
             weights = distinct_weights(original, &secret);
             row.fill_distinct(&accuracy, &self.baseline, &weights, &plan.thresholds);
         }
-        let mut finished = Finished {
-            row,
-            accuracy,
-            baseline: &self.baseline,
-            secret,
-            weights,
-            whole: Vec::new(),
-            n_listed: made.lists.records().len(),
-            seconds: RowSeconds::default(),
-        };
+        let (baseline, whole, seconds) = (&self.baseline, Vec::new(), RowSeconds::default());
+        let n_listed = made.lists.records().len();
+        let mut finished =
+            Finished { row, accuracy, baseline, secret, weights, whole, n_listed, seconds };
         let mut metrics = Vec::new();
         for measure in &plan.measures {
             let measured = measure.measure(&self.cell(&finished, made, recovered))?;

@@ -1,5 +1,7 @@
 //! Plausibility checks: does data without a fingerprint belong to this map?
 
+use rayon::prelude::*;
+
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, distance, dot, median, sub, widen};
@@ -178,22 +180,32 @@ impl<const D: usize> Truth<'_, D> {
         median_or_zero(own.collect())
     }
 
-    /// Returns how many lines and rays pass exactly through the point of another record, and how many were examined. Where such records
+    /// Returns how many lines or rays pass exactly through the point of another record, and how many were examined. Where such records
     /// meet, they give points away. Other families meet other points by chance, and decoys meet all in one.
     pub fn through_others(&self) -> (usize, usize) {
-        let records = self.released.obfuscation();
+        let (records, slots) = (self.released.obfuscation(), self.released.slots_per_record());
         let is_line = matches!(records, Obfuscation::Lines(_) | Obfuscation::Rays(_));
         if !is_line || records.is_bearings() {
             return (0, 0);
         }
-        let (limit, places) = (self.farthest_for_rounding(), self.places().collect::<Vec<_>>());
-        let meets = |&&(own, place): &&(usize, [f64; D])| {
-            let is_on = |point| distance_to_record(records, own, point) <= limit;
-            let mut others = places.iter().filter(|(other, _)| *other != own);
-            others.any(|(_, point)| is_on(point) && distance(point, &place) > APART * limit)
+        let places: Vec<_> = self.places().collect();
+        let meets = |&&own: &&usize| {
+            let mut taken: Vec<[f64; D]> =
+                places[own * slots..][..slots].iter().map(|of| of.1).collect();
+            let of_own = taken.iter().map(|x| rounding(records, own, x)).fold(0.0, f64::max);
+            // A point may lie on the center of all rays.
+            if let Obfuscation::Rays(rays) = records {
+                taken.push(widen(&rays.centers()[usize::from(rays.center()[own])]));
+            }
+            places.iter().any(|&(other, point)| {
+                let limit = rounding(records, own, &point).max(of_own);
+                let is_on = other != own && distance_to_record(records, own, &point) <= limit;
+                is_on && taken.iter().all(|x| distance(&point, x) > APART * limit)
+            })
         };
-        let examined = places.iter().step_by(places.len().div_ceil(EXAMINED).max(1));
-        (examined.clone().filter(meets).count(), examined.len())
+        let every = records.len().div_ceil(EXAMINED).max(1);
+        let examined: Vec<usize> = (0..records.len()).step_by(every).collect();
+        (examined.par_iter().filter(meets).count(), examined.len())
     }
 
     /// Returns whether most hidden points are off their records as by a scheme's noise: in directions
