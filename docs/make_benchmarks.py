@@ -9,7 +9,7 @@ or some sections of them, named after the folder; each prints on stderr how long
     noise       1 min    noise models of the oracle
     own         5 min    an attacker's own sources
     alone       1 min    attacks on the records alone
-    large       5 min    the cost of 700,000 points
+    large      26 min    the cost of 700,000 points
     images     20 min    keypoints of photos
     k           5 min    keypoints of photos, for lists of 10 to 100
     pictures   15 min    pictures painted from what came back
