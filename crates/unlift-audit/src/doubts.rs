@@ -174,7 +174,7 @@ pub fn check_thresholds(
     let [smallest_text, largest_text] = [smallest, largest].map(|t| with_sign(&t.label, unit));
     let error = |text: String| {
         Error::request(format!("{option}: expected {text}")).advise(match unit {
-            Unit::Meter => "another --scale (meters per unit of the map), or other --thresholds",
+            Unit::Meter => "another --scale (of a released map: lengths in the unit that it states), or other --thresholds",
             Unit::KthNeighbor | Unit::Pixel => "other --thresholds, or none for the usual ones",
         })
     };

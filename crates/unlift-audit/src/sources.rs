@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use unlift::audit::{NeighborsBy, Plan};
 use unlift::neighbors::sources::{self, Named, SourceEntry};
-use unlift::neighbors::{KeptPairs, Needs, Neighborhoods, Overlap, Similarity, Source};
+use unlift::neighbors::{
+    KeptPairs, Needs, Neighborhoods, Overlap, Similarity, Source, has_usual_order,
+};
 use unlift::released::Released;
 use unlift::{Descriptors, Error, ErrorKind, RecordId};
 
@@ -34,26 +36,23 @@ pub fn usual<const D: usize>(has_descriptors: bool) -> Vec<NeighborsBy<D>> {
     best.into_iter().chain([NeighborsBy::Oracle]).collect()
 }
 
-/// Uses `learned` or `similarity`, whose lists agree better with themselves, for descriptors of a network's width, and `similarity` for
-/// all others. SIFT in images is always `learned`'s.
+/// Uses `learned` for SIFT whose columns have the usual order, and for other descriptors of a network's width unless lists by `similarity`
+/// agree better with themselves; `similarity` for all others.
 #[derive(Clone, Copy, Debug)]
 struct ByDescriptors;
 
-/// Factor by which lists by `similarity` must agree better with themselves than those of a network (docs/decisions/sources.md). A walk
-/// along the network's lists of SIFT makes these agree, so that a little less decides there. Castle has 0.82, fountain 0.81.
+/// Factor by which lists by `similarity` must agree better with themselves than those of a network (docs/decisions/sources.md).
 const BETTER: f64 = 1.08;
-const BETTER_THAN_WALK: f64 = 0.95;
 
-/// Returns the source for the kind of `descriptors`, and another one with its factor if the kind is a guess.
+/// Returns the source for the kind of `descriptors`, and another one if the kind is a guess.
 fn candidates<const D: usize>(
     descriptors: Option<&Descriptors>,
-) -> (Box<dyn Source<D>>, Option<(Similarity, f64)>) {
+) -> (Box<dyn Source<D>>, Option<Similarity>) {
     let takes = |source: &dyn Source<D>| descriptors.is_some_and(|some| source.takes(some).is_ok());
     match (takes(&unlift_vision::network::Learned), takes(&Overlap)) {
+        (_, true) if !descriptors.is_some_and(has_usual_order) => (Box::new(Similarity), None),
         (true, is_sift) => {
-            let factor = if is_sift { BETTER_THAN_WALK } else { BETTER };
-            let other = (D == 3 || !is_sift).then_some((Similarity, factor));
-            (Box::new(unlift_vision::network::Learned), other)
+            (Box::new(unlift_vision::network::Learned), (!is_sift).then_some(Similarity))
         }
         (false, true) => (Box::new(Overlap), None),
         (false, false) => (Box::new(Similarity), None),
@@ -104,10 +103,10 @@ impl<const D: usize> Source<D> for ByDescriptors {
     ) -> Result<Neighborhoods, Error> {
         let (first, second) = candidates(released.descriptors());
         let lists = first.lists_keeping(released, k, seed, kept)?;
-        let Some((second, factor)) = second else { return Ok(lists) };
+        let Some(second) = second else { return Ok(lists) };
         let others = second.lists_keeping(released, k, seed, kept)?;
         let agreement = |lists| agreement(lists, released.slots_per_record());
-        Ok(if agreement(&others) > factor * agreement(&lists) { others } else { lists })
+        Ok(if agreement(&others) > BETTER * agreement(&lists) { others } else { lists })
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
@@ -180,7 +179,7 @@ mod tests {
         let floats =
             |dim: usize| Values::F32((0..dim * 8).map(|at| (at * 37 % 11) as f32 - 5.0).collect());
         let sift = Values::U8((0..128 * 8).map(|at| (at * 37 % 101) as u8).collect());
-        assert_eq!(best(sift, 128), ("learned".to_owned(), true));
+        assert_eq!(best(sift, 128), ("learned".to_owned(), false));
         assert_eq!(best(floats(128), 128), ("learned".to_owned(), true));
         assert_eq!(best(floats(64), 64), ("similarity".to_owned(), false));
     }

@@ -18,7 +18,7 @@
 //!
 //! // The released data is public. The owner keeps the ground truth.
 //! let (released, secret) = obfuscate(&olc::ENTRY, &original, None, &Key::from_seed(0))?;
-//! stage::write_released(&folder.join("released.npz"), &released)?;
+//! stage::write_released(&folder.join("released.npz"), &released, Some("olc"))?;
 //! stage::write_truth(&folder.join("truth.npz"), &original, &secret)?;
 //! let read_again = stage::read_released::<3>(&folder.join("released.npz"))?;
 //! assert_eq!(read_again.fingerprint(), released.fingerprint());

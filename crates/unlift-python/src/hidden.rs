@@ -71,7 +71,8 @@ impl Released {
     /// Writes the released map (`.npz`), as `unlift obfuscate` does. Replaces other files only with `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
-        let write = |path: &Path| of_either!(&self.0, released => write_released(path, released));
+        let write =
+            |path: &Path| of_either!(&self.0, released => write_released(path, released, None));
         save(py, (path, force), Kind::Released, write)
     }
 

@@ -302,7 +302,7 @@ pub(crate) fn different(a: &Input, b: &Input) -> Vec<Incomparable> {
     }
     for (role, was) in &a.other_sha256 {
         let is = b.other_sha256.get(role).unwrap_or(was);
-        expect(&format!("hash of the file of {role}"), was, is);
+        expect(&format!("hash of {role}"), was, is);
     }
     // A scheme may release one truth in any number of files.
     let has_truth = [a, b].iter().all(|input| input.other_sha256.contains_key("truth"));

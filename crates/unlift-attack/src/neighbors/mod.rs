@@ -28,7 +28,7 @@ pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
 pub use kept::KeptLists;
 pub(crate) use kind::comparable;
-pub use kind::{DescriptorKind, are_bits};
+pub use kind::{DescriptorKind, are_bits, has_usual_order};
 pub(crate) use mutual::{Blocks, mutual};
 pub use neighborhoods::Neighborhoods;
 pub use overlap::{Overlap, REACHES};

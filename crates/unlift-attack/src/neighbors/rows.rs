@@ -34,7 +34,8 @@ pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
     slots
 }
 
-/// Descriptor rows sorted by content: permuting the records of a released map permutes its lists, except for equal rows.
+/// Descriptor rows sorted by content: permuting the records of a released map permutes its lists, except for equal rows. Rows of zeros
+/// say nothing and are left out: they have empty lists, and no list names them.
 pub struct Rows<'a> {
     /// All descriptors, by slot, as they are compared.
     pub descriptors: Cow<'a, Descriptors>,
@@ -59,13 +60,14 @@ impl<'a> Rows<'a> {
         released: &Released<D>,
         k: usize,
     ) -> Result<Self, Error> {
-        let n_records = released.n_records();
+        let slots_per_record = released.slots_per_record();
+        let mut slots = by_content(descriptors);
+        slots.retain(|&slot| descriptors.row(slot as usize).iter().any(|&x| x != 0.0));
+        let n_records = slots.len() / slots_per_record;
         if k == 0 || n_records < k + 1 {
             let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
             return Err(Error::new("k", expected, k));
         }
-        let slots = by_content(descriptors);
-        let slots_per_record = released.slots_per_record();
         let records = records_of(&slots, slots_per_record);
         Ok(Self { descriptors: Cow::Borrowed(descriptors), slots, records, slots_per_record })
     }
@@ -104,13 +106,13 @@ impl<'a> Rows<'a> {
         ranked: &[Ranked],
         k: usize,
     ) -> Result<Neighborhoods, Error> {
-        let mut row_of = vec![0; self.len()];
-        for (row, &slot) in self.slots.iter().enumerate() {
-            row_of[slot as usize] = row;
+        let mut ranked_of: Vec<&[(f32, u32)]> = vec![&[]; released.n_slots()];
+        for (ranked, &slot) in ranked.iter().zip(&self.slots) {
+            ranked_of[slot as usize] = ranked;
         }
-        let list = |row: usize| {
+        let list = |ranked: &[(f32, u32)]| {
             let mut list: Vec<(f32, RecordId)> = Vec::with_capacity(k);
-            for &(score, partner) in &ranked[row] {
+            for &(score, partner) in ranked {
                 let record = RecordId(self.records[partner as usize]);
                 if list.len() < k && list.iter().all(|&(_, listed)| listed != record) {
                     list.push((score, record));
@@ -118,6 +120,6 @@ impl<'a> Rows<'a> {
             }
             list
         };
-        Neighborhoods::scored(row_of.into_iter().map(list), released, RowOrder::DescriptorRows)
+        Neighborhoods::scored(ranked_of.into_iter().map(list), released, RowOrder::DescriptorRows)
     }
 }

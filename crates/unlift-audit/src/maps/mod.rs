@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use unlift::audit::PointNeighbors;
-use unlift::audit::doubts::unlike_neighbors;
+use unlift::audit::doubts::of_descriptors;
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::{distance, median};
 use unlift::seed::{Draws, Stage};
@@ -171,7 +171,7 @@ pub fn open(
     }
     if let Some(rows) = &prepared.descriptors {
         remarks.notes.extend(zeros(rows));
-        remarks.doubts.extend(unlike_neighbors(prepared.original.reveal(), rows)?);
+        remarks.doubts.extend(of_descriptors(prepared.original.reveal(), rows)?);
     }
     Ok(Prepared { remarks, descriptors_file: file, input, ..prepared })
 }

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use unlift::Fingerprint;
-use unlift::audit::doubts::unlike_neighbors;
+use unlift::audit::doubts::of_descriptors;
 use unlift::released::Released;
 use unlift::truth::Secret;
+use unlift::{Descriptors, Fingerprint, PointSet};
 use unlift_io::Error as FileError;
-use unlift_io::hash::{hash_file, hash_files};
+use unlift_io::hash::{hash_file, hash_files, hash_positions};
 use unlift_io::read::{self, Input as Points};
 use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
@@ -64,33 +64,49 @@ impl Files<'_> {
         let (original, secret) = read_truth::<3>(self.truth)?;
         same_map(self.released, Some(released.fingerprint()), self.truth, secret.map())?;
         expect_slots(self.released, &released, &secret)?;
-        let released = self.described(released, &secret)?;
+        let of_points = self.of_points(&released, &secret)?;
+        let released = self.described(released, &secret, of_points.as_ref())?;
         let secret = secret.with_map(Some(released.fingerprint()));
         let mut prepared = Prepared::of(original);
         prepared.remarks.notes.extend(released.descriptors().and_then(zeros));
         let row = |slot: Option<usize>| Some(secret.descriptor_row()[slot?]);
         // Without the descriptors of all points, other schemes have none.
         let order: Option<Vec<u32>> = slot_of(&secret).into_iter().map(row).collect();
-        if let (Some(rows), Some(order)) = (released.descriptors(), order) {
-            let points = prepared.original.reveal();
-            let rows = rows.select(&order);
-            prepared.remarks.doubts.extend(unlike_neighbors(points, &rows)?);
+        let of_slots = || Some(released.descriptors()?.select(&order?));
+        if let Some(rows) = of_points.or_else(of_slots) {
+            prepared.remarks.doubts.extend(of_descriptors(prepared.original.reveal(), &rows)?);
             // Other schemes would release the plain descriptors, which are not known here.
             prepared.descriptors = released.protected().is_none().then_some(rows);
         }
         Ok(Release { prepared, hidden: (released, secret) })
     }
 
-    /// Returns the released map with the descriptors of the file of descriptors, if there is one.
-    fn described(&self, released: Released<3>, secret: &Secret) -> Result<Released<3>, Error> {
-        let Some(path) = self.descriptors else { return Ok(released) };
+    /// Reads the file of descriptors, if there is one.
+    fn of_points(
+        &self,
+        released: &Released<3>,
+        secret: &Secret,
+    ) -> Result<Option<Descriptors>, Error> {
+        let Some(path) = self.descriptors else { return Ok(None) };
         if released.descriptors().is_some() {
             let path = self.released.display();
             bail!("--descriptors: expected with a released map without, found some in {path}");
         }
         // Only the ids of the points are needed.
         let ids = (0..secret.n_originals() as u64).collect();
-        let of_originals = read::descriptors(path, &Points { ids, ..Points::default() })?;
+        Ok(Some(read::descriptors(path, &Points { ids, ..Points::default() })?))
+    }
+
+    /// Returns the released map with its descriptors among those of all points, if these are given.
+    fn described(
+        &self,
+        released: Released<3>,
+        secret: &Secret,
+        of_points: Option<&Descriptors>,
+    ) -> Result<Released<3>, Error> {
+        let (Some(path), Some(of_points)) = (self.descriptors, of_points) else {
+            return Ok(released);
+        };
         let mut of_rows = vec![0; secret.n_slots()];
         for (slot, &row) in secret.descriptor_row().iter().enumerate() {
             of_rows[row as usize] = secret.hidden()[slot].0;
@@ -100,22 +116,24 @@ impl Files<'_> {
             released.slots_per_record(),
             released.origin(),
             released.unit(),
-            Some(of_originals.select(&of_rows)),
+            Some(of_points.select(&of_rows)),
         );
         let described = described.map_err(|error| FileError::core(path, error))?;
         Ok(described.with_bounds(released.bounds()))
     }
 
-    /// Returns what a report says of the files of `n_points` points.
-    pub fn about(&self, n_points: usize) -> Result<Input, Error> {
-        let mut others = vec![("truth".to_owned(), hash_file(self.truth)?)];
+    /// Returns what a report says of the files, which have these `points`. Their order, which each release changes, does not count.
+    pub fn about(&self, points: &PointSet<3>) -> Result<Input, Error> {
+        let mut positions = points.positions().to_vec();
+        positions.sort_unstable_by(|a, b| a.partial_cmp(b).expect("finite positions"));
+        let mut others = vec![("truth".to_owned(), hash_positions(&positions))];
         if let Some(path) = self.descriptors {
             others.push(("descriptors".to_owned(), hash_file(path)?));
         }
         Ok(Input {
             path: Some(self.released.display().to_string()),
             sha256: Some(hash_files(&[self.released])?),
-            n_points: n_points as u64,
+            n_points: points.len() as u64,
             other_sha256: others.into_iter().collect(),
             ..Input::default()
         })

@@ -221,9 +221,11 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let map = Map { plan, ..Map::new(&prepared) };
         let published = published_positions(&args.released)?;
         let input = Input::Released(map, Hidden { release: &hidden, published });
-        audit.about = files.about(n_points)?;
+        audit.about = files.about(points)?;
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options.insert("released".into(), json!(true));
+        // The file does not state it, so it may be a scheme of the user's own.
+        audit.options.extend(args.name.iter().map(|name| ("name".into(), json!(name))));
         audit.run(&input, &progress)
     })
 }

@@ -93,11 +93,7 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
     let rules = Rules::new(inputs, false);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
-    if args.out.join(RELEASED).exists() {
-        stderr::note(
-            "--out: an earlier release is replaced: never publish both, as their records meet in the points",
-        );
-    }
+    let replaces = args.out.join(RELEASED).exists();
     let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
         return obfuscate_images(args, out);
     };
@@ -114,10 +110,20 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
         }
         None => None,
     };
+    if let (None, Some(file)) = (&prepared.descriptors, prepared.input.beside.first()) {
+        let file = file.display();
+        stderr::note(format!("no descriptors are released (--descriptors {file})"));
+    }
+    if replaces {
+        stderr::note(
+            "--out: an earlier release is replaced: never publish both, as their records meet in the points",
+        );
+    }
     let hidden = hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key(args)?);
     let (released, secret) = hidden.map_err(|error| FileError::core(&args.path, error))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
-    write_released(&out.stage(RELEASED, Kind::Stage(Stage::Released))?, &released)?;
+    let path = out.stage(RELEASED, Kind::Stage(Stage::Released))?;
+    write_released(&path, &released, Some(name))?;
     out.commit()?;
     let (slots, records) = (released.n_slots(), released.n_records());
     let (dropped, folder) = (secret.dropped().len(), OneLine(args.out.display()));

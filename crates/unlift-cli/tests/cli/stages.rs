@@ -142,7 +142,7 @@ fn given_records_are_audited_with_their_truth_only() {
     let audit = "audit released hidden/released.npz --k 10 --truth";
     place.refuses(audit, &[
         ("two/truth.npz --out x", 3, "unlift: hidden/released.npz: fingerprint: expected "),
-        ("hidden/truth.npz --out x --gate olc@1:0.25<=5", 2, "scheme: expected one of released, found olc"),
+        ("hidden/truth.npz --out x --gate ppl@1:0.25<=5", 2, "scheme: expected one of olc, found ppl"),
         ("hidden/truth.npz --out x --name all", 2, "(not all), found all"),
         ("hidden/truth.npz --out x --name olc --schemes olc", 2, "unlift: --name: expected another name"),
     ]);

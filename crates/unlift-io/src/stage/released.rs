@@ -26,9 +26,15 @@ const FAMILIES: [(&str, &str); 4] = [
 
 /// Writes a released map, one row per record.
 ///
-/// It contains nothing of the ground truth: no ids, names or times.
-pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Result<(), Error> {
-    write_file(path, Access::Usual, written(released))
+/// It contains nothing of the ground truth: no ids, names or times. Its metadata state the name of the `scheme`, if it is known.
+pub fn write_released<const D: usize>(
+    path: &Path,
+    released: &Released<D>,
+    scheme: Option<&str>,
+) -> Result<(), Error> {
+    let mut written = written(released);
+    written.state("scheme", scheme);
+    write_file(path, Access::Usual, written)
 }
 
 pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {

@@ -231,7 +231,7 @@ fn bytes_of(folder: &str, name: &str) -> Vec<u8> {
         "table.csv" => b"# id x y z\n1,0.5,2,-3e2\n2,1,nan,4\n".to_vec(),
         "released.npz" => {
             let (_dir, path) = write(name, "");
-            stage::write_released(&path, &maps::released::<3>(3, 40)[2]).unwrap();
+            stage::write_released(&path, &maps::released::<3>(3, 40)[2], None).unwrap();
             fs::read(path).unwrap()
         }
         _ => fixture(Path::new(folder).join(name).to_str().unwrap()),

@@ -32,6 +32,10 @@ pub(crate) fn steps(results: &Results<'_>) -> Value {
         "can_mitigate": given.is_none() && options.get("mitigate").is_none(),
         "can_localize": !localization.is_empty() && !options.contains_key("hold_out"),
         "gate": if gates.is_empty() { gate(results, cards) } else { None },
+        "extent": input.extent_m.map(|sides| {
+            let longest = sides.into_iter().fold(0.0, f64::max);
+            [0.8, 1.25].map(|times| words::significant(times * longest, 2)).join("..")
+        }),
     })
 }
 
@@ -84,5 +88,8 @@ fn least(results: &Results<'_>, cards: &[Card]) -> Option<Value> {
     let times = localization.and_then(Localization::cost).map(|cost| words::significant(cost, 3));
     let (scheme, shares) = (&card.scheme, shares.join(", "));
     let has_cost = localization.is_some();
-    Some(json!({ "scheme": scheme, "shares": shares, "has_cost": has_cost, "times": times }))
+    let all_localize = cards.iter().all(|card| verdict::localizes(results, &card.scheme));
+    Some(json!({
+        "scheme": scheme, "shares": shares, "has_cost": has_cost, "times": times, "all_localize": all_localize,
+    }))
 }

@@ -335,9 +335,14 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
     let undecided = words::list(&undecided);
     let open = (!undecided.is_empty()).then(|| format!("Nothing is decided about {undecided}."));
     if let Some(largest) = largest(little.iter().copied()) {
-        let but = match little.iter().any(|leak| localizes(results, &leak.scheme)) {
-            true => "",
-            false => ", but most cameras cannot be placed with it",
+        let useless = little.iter().filter(|leak| !localizes(results, &leak.scheme));
+        let useless: Vec<&Finding> = useless.copied().collect();
+        let but = match useless.as_slice() {
+            [] => String::new(),
+            all if all.len() == little.len() => {
+                ", but most cameras cannot be placed with it".to_owned()
+            }
+            some => format!(", but most cameras cannot be placed under {}", names(some)),
         };
         let under = format!(
             "Under {}, no attack tried here on released data recovers more than {} of the {} {}{but}.",
@@ -383,10 +388,11 @@ pub(crate) fn localization<'a>(results: &Results<'a>, scheme: &str) -> Option<&'
     all.find(|of| of.scheme == scheme && !of.of_queries)
 }
 
-/// Returns false if most cameras cannot be placed under `scheme`.
+/// Returns false if most cameras cannot be placed under `scheme`, or without its change if its own cost is not known.
 pub(crate) fn localizes(results: &Results<'_>, scheme: &str) -> bool {
-    let cost = localization(results, scheme);
-    cost.is_none_or(|cost| cost.is_unknown() || cost.cost().is_some())
+    let known = |name: &str| localization(results, name).filter(|cost| !cost.is_unknown());
+    let plain = scheme.split_once('_').map_or(scheme, |(plain, _)| plain);
+    known(scheme).or_else(|| known(plain)).is_none_or(|cost| cost.cost().is_some())
 }
 
 /// Returns the cards of schemes that publish no bearings: what those show is not the points that came back.
@@ -444,7 +450,9 @@ pub(crate) fn not_tried(results: &Results<'_>) -> Option<String> {
         (!alone).then_some("the attack on the records alone"),
         images.then_some("several queries with known poses (unlift audit sequence)"),
     ];
-    let own = results.schemes.iter().filter(|scheme| words::scheme_rule(scheme).is_empty());
+    let named = results.document.options.get("name").and_then(|name| name.as_str());
+    let is_own = |name: &str| words::scheme_rule(name).is_empty() || named == Some(name);
+    let own = results.schemes.iter().filter(|scheme| is_own(scheme));
     let own: Vec<String> = own.map(|scheme| format!("an attack made for {scheme}")).collect();
     let kinds = kinds.into_iter().flatten().chain(own.iter().map(String::as_str));
     let kinds: Vec<&str> = kinds.collect();
@@ -476,12 +484,14 @@ fn attack_sentence(results: &Results<'_>, finding: &Finding) -> String {
     match finding.basis {
         Basis::Released => {
             let from = finding.when.trim_start_matches("Today, ");
-            format!("An attacker recovers {what} today, {from} ({by}).")
+            format!("The strongest attack tried recovers {what} today, {from} ({by}).")
         }
-        Basis::Given => format!("An attacker recovers {what} with given neighbors ({by})."),
+        Basis::Given => {
+            format!("The strongest attack tried recovers {what} with given neighbors ({by}).")
+        }
         Basis::Oracle => {
             let known = finding.when.to_lowercase();
-            format!("An attacker would recover {what} {known} ({by}).")
+            format!("The strongest attack tried would recover {what} {known} ({by}).")
         }
     }
 }

@@ -53,7 +53,7 @@ fn verdict(document: &Document) -> String {
 fn the_verdict_names_the_strongest_attack_of_every_scheme() {
     let of_lists = [
         "Do not release this map under olc, ray and ray-voxel. Not tried: attacks by descriptors. The least leak of these, 20.8 % \
-         (ray-voxel), is a fifth or more of the points. Nothing is decided about cp, ppl, ppl+ and plane. An attacker recovers 58.6 % of the points of this map within \
+         (ray-voxel), is a fifth or more of the points. Nothing is decided about cp, ppl, ppl+ and plane. The strongest attack tried recovers 58.6 % of the points of this map within \
          10 cm today, from the released data alone (olc, records alone). If half of the neighbors were known, every scheme \
          tried would give back 83.3 % or more.",
         "olc Random lines Today, from the released data alone 58.6 % records alone (tomography) If half of the \
@@ -230,7 +230,7 @@ fn a_page_of_images_speaks_of_keypoints_and_pixels() {
     let text = without_script(&page);
     assert!(text.contains("2 of 4 images. 1 could not be used. 1 had fewer keypoints"));
     let said = verdict(&document);
-    let sentence = "An attacker would recover 79.5 % of the keypoints of these images within 10 px";
+    let sentence = "The strongest attack tried would recover 79.5 % of the keypoints of these images within 10 px";
     assert!(said.contains(sentence), "{said}");
     assert!(text.contains("<td>94.2</td>") && text.contains("id=\"table-distinct\""));
     assert!(page.contains("\"unit\":\"px\""));
@@ -289,11 +289,11 @@ fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
 #[rustfmt::skip] // One row per line.
 fn the_banner_says_how_bad_it_is() {
     for (schemes, color, expected) in [
-        (&["olc"][..], "red", "Do not release this map under olc. Not tried: attacks by descriptors. An attacker recovers 58.6 %"),
+        (&["olc"][..], "red", "Do not release this map under olc. Not tried: attacks by descriptors. The strongest attack tried recovers 58.6 %"),
         (&["ray", "ray-voxel"], "orange", "Do not release this map under any scheme tried. Not tried: attacks by descriptors. The least leak, 20.8 % (ray-voxel), is a fifth or more of the points."),
-        (&["ppl", "cp"], "orange", "Nothing is decided about this map under cp and ppl. Not tried: attacks by descriptors. An attacker recovers 16.2"),
+        (&["ppl", "cp"], "orange", "Nothing is decided about this map under cp and ppl. Not tried: attacks by descriptors. The strongest attack tried recovers 16.2"),
         // An untested attack is no good result.
-        (&["plane"], "orange", "Not tested: what an attacker recovers from the released data alone. Not tried: attacks by descriptors and the attack on the records alone. An attacker would recover 83.7 % of the points of this map within 10 cm if half of the neighbors were known (plane, known neighbors)."),
+        (&["plane"], "orange", "Not tested: what an attacker recovers from the released data alone. Not tried: attacks by descriptors and the attack on the records alone. The strongest attack tried would recover 83.7 % of the points of this map within 10 cm if half of the neighbors were known (plane, known neighbors)."),
     ] {
         let mut document = sample::document(true);
         sample::retain(&mut document, |scheme| schemes.contains(&scheme));

@@ -3,12 +3,15 @@
 
 use std::borrow::Borrow;
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::{Row, Threshold};
 use crate::evaluate::{OFF_RECORD, Truth, are_strangers, nearer_to_own, recovered_away};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, median};
+use crate::neighbors::{DescriptorKind, has_usual_order};
 use crate::recover::{Recovered, Status};
-use crate::released::Released;
+use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error, PointSet, Unit};
 
@@ -104,6 +107,32 @@ pub fn of_release(
         .or_else(|| strays(false, &away, least, unit))
         .or_else(|| mistaken_unit(unit, k, middle))
         .or_else(|| crossings(truth.through_others()))
+        .or_else(|| of_directions(truth.released.obfuscation()))
+}
+
+/// Share of the squared lengths of unit directions along one axis from which on records are nearly parallel: 11 degrees are usual.
+const PARALLEL: f64 = 0.98;
+
+/// Returns a doubt if records start in one center or are nearly parallel: what they show as an image of the scene needs no attack.
+fn of_directions(records: &Obfuscation<3>) -> Option<String> {
+    let directions = match records {
+        Obfuscation::Lines(lines) => lines.direction(),
+        Obfuscation::Rays(rays) => rays.direction(),
+        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => return None,
+    };
+    let mut squares = Matrix3::<f64>::zeros();
+    for direction in directions.iter().map(|d| Vector3::from(d.map(f64::from))) {
+        squares += direction * direction.transpose();
+    }
+    let along = squares.symmetric_eigenvalues().max() / squares.trace();
+    let what = match records.is_bearings() {
+        true => "all start in one center",
+        false if along > PARALLEL => "are nearly parallel",
+        false => return None,
+    };
+    Some(format!(
+        "released: records {what}, so two coordinates of each point are published: whoever looks along them sees the scene"
+    ))
 }
 
 /// Returns a doubt if records pass through points of others.
@@ -161,33 +190,67 @@ const OTHERS: usize = 16;
 /// Smallest number of points whose figures say something.
 pub(super) const FEWEST: f64 = 30.0;
 
-/// Returns a doubt if descriptors are no more like those of the nearest points than like others, as in another order of rows.
+/// Largest relative deviation of the lengths of descriptors that are normalized.
+const NORMALIZED: f32 = 0.03;
+
+/// Returns doubts about descriptors: in another order of rows, as those of nearest points must be alike, or of columns, where networks
+/// for SIFT are of no use. Rows of zeros are left out.
 ///
 /// # Errors
 /// If there are no points.
-pub fn unlike_neighbors(
+pub fn of_descriptors(
     points: &PointSet<3>,
     descriptors: &Descriptors,
-) -> Result<Option<String>, Error> {
-    let (knn, n) = (Knn::new(points.positions())?, points.len());
-    let (mut nearest, mut share, rows) =
-        (Vec::new(), 0.0, (0..n).step_by(n.div_ceil(SAMPLE).max(1)));
-    let n_rows = rows.len() as f64;
-    for row in rows {
-        knn.nearest(row, 1, &mut nearest);
-        let like = |other: usize| descriptors.squared_distance(row, other);
-        let near = nearest.first().map_or(f32::INFINITY, |near| like(near.1 as usize));
-        let others = (1..=OTHERS).map(|at| like((row + 1 + at * (n - 1) / (OTHERS + 1)) % n));
-        let more = |other: f32| if near == other { 0.5 } else { f64::from(near < other) };
-        share += others.map(more).sum::<f64>() / (OTHERS as f64 * n_rows);
+) -> Result<Vec<String>, Error> {
+    let length2 = |row: Vec<f32>| row.iter().map(|x| x * x).sum::<f32>();
+    let lengths2: Vec<f32> = descriptors.rows().map(length2).collect();
+    let told = (0..lengths2.len() as u32).filter(|&row| lengths2[row as usize] > 0.0);
+    let told: Vec<u32> = told.collect();
+    let positions: Vec<_> = told.iter().map(|&row| points.positions()[row as usize]).collect();
+    let (n, mut doubts, mut nearest) = (told.len(), Vec::new(), Vec::new());
+    if (n as f64) < FEWEST {
+        return Ok(doubts);
     }
+    let (knn, descriptors) = (Knn::new(&positions)?, descriptors.select(&told));
+    let rows = || (0..n).step_by(n.div_ceil(SAMPLE));
+    let n_rows = rows().len() as f64;
+    // The share of descriptors, each `by` rows further on, that are more like that of the nearest point than like another one.
+    let mut share = |by: usize| {
+        let mut alike = 0.0;
+        for row in rows() {
+            knn.nearest(row, 1, &mut nearest);
+            let like =
+                |other: usize| descriptors.squared_distance((row + by) % n, (other + by) % n);
+            let near = nearest.first().map_or(f32::INFINITY, |near| like(near.1 as usize));
+            let others = (1..=OTHERS).map(|at| like((row + 1 + at * (n - 1) / (OTHERS + 1)) % n));
+            let more = |other: f32| if near == other { 0.5 } else { f64::from(near < other) };
+            alike += others.map(more).sum::<f64>() / (OTHERS as f64 * n_rows);
+        }
+        alike
+    };
+    let (as_given, before, after) = (share(0), share(n - 1), share(1));
     // The share of a point deviates by 0.3, so this is three deviations.
-    let doubt = format!(
-        "descriptors: {:.0} % are more like that of the nearest point than like another one, where 50 % are so by \
-         chance: of another map, or in another order of rows?",
-        100.0 * share
-    );
-    Ok((n_rows >= FEWEST && share < 0.5 + 0.9 / n_rows.sqrt()).then_some(doubt))
+    let chance = 0.9 / n_rows.sqrt();
+    if as_given < 0.5 + chance || before.max(after) > as_given + chance {
+        doubts.push(format!(
+            "descriptors: {:.0} % are more like that of the nearest point than like another one, where 50 % are so by \
+             chance, and {:.0} % if they move by one row: of another map, or in another order of rows?",
+            100.0 * as_given,
+            100.0 * before.max(after)
+        ));
+    }
+    let lengths = || told.iter().map(|&row| lengths2[row as usize].sqrt());
+    let mean = lengths().sum::<f32>() / n as f32;
+    let deviation2 = lengths().map(|x| (x - mean) * (x - mean)).sum::<f32>() / n as f32;
+    let is_sift = DescriptorKind::of(&descriptors, "") == Ok(DescriptorKind::Sift);
+    if is_sift && deviation2.sqrt() < NORMALIZED * mean && !has_usual_order(&descriptors) {
+        doubts.push(
+            "descriptors: 128 values like SIFT's, but in another order of columns (or of another kind): the best attack, a \
+             network, was not tried; write them as COLMAP does"
+                .to_owned(),
+        );
+    }
+    Ok(doubts)
 }
 
 /// Formats a length with three digits and its unit, if it has one.

@@ -81,7 +81,7 @@ fn the_snippets_of_the_document_run() {
     assert!(images.next_image().unwrap().is_none());
 
     // The last snippet reads what unlift wrote.
-    stage::write_released(&at("released.npz"), &released).unwrap();
+    stage::write_released(&at("released.npz"), &released, None).unwrap();
     stage::write_neighborhoods(&at("neighborhoods.npz"), &lists).unwrap();
     stage::write_truth(&at("truth.npz"), &original, &secret).unwrap();
     stage::write_recovered(&at("recovered.npz"), &back).unwrap();

@@ -33,7 +33,8 @@ pub fn values_come_back<const D: usize>(folder: &Path, sizes: &[usize], change: 
     for (&n, seed) in sizes.iter().zip(0..) {
         for released in maps::released::<D>(seed, n) {
             let family = released.obfuscation().family();
-            let path = written(Kind::Released, &|path| stage::write_released(path, &released));
+            let path =
+                written(Kind::Released, &|path| stage::write_released(path, &released, None));
             let read = stage::read_released::<D>(&path).unwrap();
             assert!(read == released, "{family} of {n} records in {D}D");
             // A released file says nothing of its source.
@@ -75,7 +76,7 @@ fn a_map_without_records_comes_back_and_a_secret_about_other_points_is_refused()
     let (_folder, path) = place("empty.npz");
     let none = Obfuscation::AxisCandidates(AxisCandidates::<3>::try_new(&[]).unwrap());
     let released = Released::try_new(none, 1, [0.0; 3], Unit::Meter, None).unwrap();
-    stage::write_released(&path, &released).unwrap();
+    stage::write_released(&path, &released, None).unwrap();
     assert_eq!(stage::read_released::<3>(&path).unwrap(), released);
     let lists = Neighborhoods::try_new(vec![0], Vec::<RecordId>::new(), None, 0, 1).unwrap();
     stage::write_neighborhoods(&path, &lists).unwrap();

@@ -185,7 +185,7 @@ fn images() {
 #[test]
 fn maps_and_stage_files_are_not_confused() {
     let (_dir, path) = write("a.npz", "");
-    stage::write_released(&path, &maps::released::<3>(1, 5)[0]).unwrap();
+    stage::write_released(&path, &maps::released::<3>(1, 5)[0], None).unwrap();
     let found = line(fs::read(&path).unwrap(), read::open);
     assert_eq!(found, "expected points of a map, found a released map");
     let points = archive(&[("points", floats("(1, 3)", &[1.0; 3]))]);
