@@ -3,7 +3,6 @@
 use serde_json::{Map, Value, json};
 use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Seconds, Threshold};
 use unlift::neighbors::Needs;
-use unlift::recover::Delta;
 use unlift_report::{Document, RenderOptions};
 
 use crate::sources;
@@ -83,11 +82,6 @@ pub fn options<const D: usize>(
     record("inlier_ratios", json!(plan.inlier_ratios));
     record("k", json!(plan.k));
     record("solver", plan.solvers.iter().map(|solver| solver.name()).collect());
-    let delta = match plan.delta {
-        Delta::Auto => json!("auto"),
-        Delta::Fixed(delta) => json!(delta),
-    };
-    record("delta", delta);
     record("thresholds", plan.thresholds.iter().map(|t| t.label.as_str()).collect());
     record("repeats", json!(plan.repeats));
     options.extend(given.clone());

@@ -11,7 +11,7 @@ use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::Source;
 use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::{SCHEMES, Scheme, SchemeOptions};
-use unlift::recover::{Delta, RecoverOptions, Solver};
+use unlift::recover::Solver;
 use unlift_audit::images::{Opened, Opening, Wanted};
 use unlift_audit::{
     Audit, Audited, Error, Gate, Images as ImagesInput, Input, Map as MapInput, Output, Request,
@@ -42,7 +42,6 @@ struct Options<'py> {
     tile_points: Option<usize>,
     #[pyo3(default)]
     tile: Option<usize>,
-    delta: Option<f64>,
     #[pyo3(default = true)]
     records_alone: bool,
     seed: u64,
@@ -232,7 +231,6 @@ impl Options<'_> {
             solvers: each("solvers", self.solvers.as_deref(), |given| solver_of(given, by))?,
             thresholds: thresholds(self.thresholds.as_ref())?,
             k: self.k,
-            delta: delta(self.delta)?,
             records_alone: self.records_alone,
             seed: self.seed,
             repeats: self.repeats,
@@ -303,11 +301,4 @@ pub fn thresholds(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Threshold>> 
         let text = threshold.str()?.to_string();
         Threshold::parse(&text).map_err(|_| wrong("thresholds", "numbers above 0", text))
     })
-}
-
-/// Returns the distance within which a record supports a position.
-pub fn delta(given: Option<f64>) -> PyResult<Delta> {
-    let delta = given.map_or(Delta::Auto, Delta::Fixed);
-    RecoverOptions { delta, ..RecoverOptions::default() }.check().map_err(raised)?;
-    Ok(delta)
 }

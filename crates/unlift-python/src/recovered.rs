@@ -12,7 +12,7 @@ use unlift::recover::{Builtin, RecoverOptions, Recovered as Found, recover as so
 use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
 use crate::arrays::{raised, to_array, to_rows};
-use crate::audit::{delta, thresholds};
+use crate::audit::thresholds;
 use crate::hidden::{Hidden, released_of, save, truth_of};
 use crate::lists::Neighborhoods;
 use crate::own::{Raised, solver_of};
@@ -98,21 +98,20 @@ impl Recovered {
 /// Recovers the points of a released map from neighbor lists, without the truth. `solver` is a name in `SOLVERS` or a function;
 /// default: "joint". `confidence=False` skips the computation of `probability_within`.
 #[pyfunction]
-#[pyo3(signature = (released, lists, *, solver=None, delta=None, seed=0, confidence=true, threads=None))]
+#[pyo3(signature = (released, lists, *, solver=None, seed=0, confidence=true, threads=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn recover(
     py: Python<'_>,
     released: &Bound<'_, PyAny>,
     lists: &Neighborhoods,
     solver: Option<&Bound<'_, PyAny>>,
-    delta: Option<f64>,
     seed: u64,
     confidence: bool,
     threads: Option<usize>,
 ) -> PyResult<Recovered> {
     let released = released_of(released)?.of_map()?;
-    let (by, options) =
-        (Raised::default(), RecoverOptions { delta: self::delta(delta)?, seed, confidence });
+    let options = RecoverOptions { seed, confidence, ..RecoverOptions::default() };
+    let by = Raised::default();
     let solver = match solver {
         Some(given) => solver_of::<3>(given, &by)?,
         None => Arc::new(Builtin::Joint),

@@ -104,38 +104,33 @@ const SAMPLE: usize = 2000;
 /// Returns whether the 128 columns of SIFT descriptors are in the usual order: four rows of four cells with eight directions each, as COLMAP,
 /// OpenCV and `unlift features` write them. An edge across several cells has the same direction in each, so cells along it are alike.
 pub fn has_usual_order(descriptors: &Descriptors) -> bool {
-    let n = descriptors.len();
-    if n < FEWEST || descriptors.dim() != DescriptorKind::Sift.dim() {
+    let (n, dim) = (descriptors.len(), descriptors.dim());
+    if n < FEWEST || dim != DescriptorKind::Sift.dim() {
         return true;
     }
-    let rows = (0..n).step_by(n.div_ceil(SAMPLE)).map(|row| descriptors.row(row));
-    let rows: Vec<Vec<f32>> = rows.collect();
+    let rows: Vec<Vec<f32>> =
+        (0..n).step_by(n.div_ceil(SAMPLE)).map(|row| descriptors.row(row)).collect();
     let column = |at: usize| -> Vec<f32> {
         let mean = rows.iter().map(|row| row[at]).sum::<f32>() / rows.len() as f32;
         let away: Vec<f32> = rows.iter().map(|row| row[at] - mean).collect();
         let length = away.iter().map(|x| x * x).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
         away.into_iter().map(|x| x / length).collect()
     };
-    let columns: Vec<Vec<f32>> = (0..descriptors.dim()).map(column).collect();
+    let columns: Vec<Vec<f32>> = (0..dim).map(column).collect();
     // Steps in rows and columns of cells along an edge whose gradient has each of four directions.
     let along = [(1, 0), (1, 1), (0, 1), (1, -1)];
-    let correlation = |direction: usize, (down, right): (i32, i32)| {
-        let (mut sum, mut n) = (0.0, 0.0);
-        for (row, col) in (0..4).flat_map(|row| (0..4).map(move |col| (row, col))) {
-            let (to_row, to_col) = (row + down, col + right);
-            if to_row < 4 && (0..4).contains(&to_col) {
-                let at = |row: i32, col: i32| &columns[(4 * row + col) as usize * 8 + direction];
-                let pairs = at(row, col).iter().zip(at(to_row, to_col));
-                sum += pairs.map(|(a, b)| a * b).sum::<f32>();
-                n += 1.0;
-            }
-        }
-        sum / n
+    let correlation = |direction: usize, (down, right): (usize, i32)| {
+        let inside = |at: i32| (0..4).contains(&at);
+        let cells = (0..16).filter(|cell| cell / 4 + down < 4 && inside((cell % 4) as i32 + right));
+        let of_cell = |cell: usize| {
+            let next = (cell + 4 * down).wrapping_add_signed(right as isize);
+            let both = columns[8 * cell + direction].iter().zip(&columns[8 * next + direction]);
+            both.map(|(a, b)| a * b).sum::<f32>()
+        };
+        let cells: Vec<f32> = cells.map(of_cell).collect();
+        cells.iter().sum::<f32>() / cells.len() as f32
     };
-    let beyond = |direction: usize| {
-        correlation(direction, along[direction % 4])
-            - correlation(direction, along[(direction + 2) % 4])
-    };
+    let beyond = |at: usize| correlation(at, along[at % 4]) - correlation(at, along[(at + 2) % 4]);
     (0..8).map(beyond).sum::<f32>() / 8.0 >= ALONG_EDGES
 }
 

@@ -65,7 +65,6 @@ def audit(
     k: int = 50,
     tile_points: int | None = None,
     tile: int | None = None,
-    delta: float | None = None,
     records_alone: bool = True,
     seed: int = 0,
     repeats: int = 1,
@@ -87,7 +86,6 @@ def audit(
     k: number of true neighbors per point.
     tile_points: cut a large map into tiles of at most this many points, and audit each as a map of its own. tile: audit only the tile
         with this number, from 0, for tasks on a cluster.
-    delta: distance up to which a neighbor supports a position. Default: the attack chooses.
     records_alone: whether to attack maps without neighbor lists, too.
     seed: random seed. repeats: number of seeds; results are means over them.
     gates: bounds, such as "olc@0.5:0.10<=20"; `Report.passed` is True if all hold.
@@ -121,7 +119,6 @@ def audit_images(
     solvers: Sequence[Solver] | Solver | None = None,
     thresholds: Iterable[float | str] | str | None = None,
     k: int = 20,
-    delta: float | None = None,
     seed: int = 0,
     repeats: int = 1,
     gates: Sequence[str] | str = (),

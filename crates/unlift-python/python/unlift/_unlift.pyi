@@ -220,7 +220,6 @@ def recover(
     lists: Neighborhoods,
     *,
     solver: str | Callable[..., Any] | None = None,
-    delta: float | None = None,
     seed: int = 0,
     confidence: bool = True,
     threads: int | None = None,

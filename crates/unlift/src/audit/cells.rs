@@ -118,7 +118,7 @@ fn cells<const D: usize>(
     let release = Release::new((owned, run), &hidden, clock, progress)?;
     let seeds = (run.oracle_seed, run.seed);
     let mut sources = Lists::new(plan.k, run.search, &hidden, seeds, run.kept);
-    let options = RecoverOptions { delta: plan.delta, seed: run.seed, ..RecoverOptions::default() };
+    let options = RecoverOptions { seed: run.seed, ..RecoverOptions::default() };
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = variant.noise.map_or(variant.by.name(), |noise| noise.name());

@@ -10,7 +10,7 @@ use crate::evaluate::{OFF_RECORD, Truth, are_strangers, nearer_to_own, recovered
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, median};
 use crate::neighbors::{DescriptorKind, has_usual_order};
-use crate::recover::{Recovered, Status};
+use crate::recover::Recovered;
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error, PointSet, Unit};
@@ -110,29 +110,29 @@ pub fn of_release(
         .or_else(|| of_directions(truth.released.obfuscation()))
 }
 
-/// Share of the squared lengths of unit directions along one axis from which on records are nearly parallel: 11 degrees are usual.
+/// Records are nearly parallel if the squares of their directions, or normals, have this share of their sum along one axis.
 const PARALLEL: f64 = 0.98;
 
-/// Returns a doubt if records start in one center or are nearly parallel: what they show as an image of the scene needs no attack.
+/// Returns a doubt if records start in one center or are nearly parallel: what they show of the scene needs no attack.
 fn of_directions(records: &Obfuscation<3>) -> Option<String> {
-    let directions = match records {
-        Obfuscation::Lines(lines) => lines.direction(),
-        Obfuscation::Rays(rays) => rays.direction(),
-        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => return None,
+    let axis = |&axis: &u8| std::array::from_fn(|c| f32::from(u8::from(c == usize::from(axis))));
+    let directions: Vec<[f32; 3]> = match records {
+        Obfuscation::Lines(lines) => lines.direction().to_vec(),
+        Obfuscation::Rays(rays) => rays.direction().to_vec(),
+        Obfuscation::AxisPlanes(planes) => planes.axis().iter().map(axis).collect(),
+        Obfuscation::AxisCandidates(_) => return None,
     };
     let mut squares = Matrix3::<f64>::zeros();
     for direction in directions.iter().map(|d| Vector3::from(d.map(f64::from))) {
         squares += direction * direction.transpose();
     }
-    let along = squares.symmetric_eigenvalues().max() / squares.trace();
+    let are_parallel = squares.symmetric_eigenvalues().max() > PARALLEL * squares.trace();
     let what = match records.is_bearings() {
-        true => "all start in one center",
-        false if along > PARALLEL => "are nearly parallel",
+        true => "start in one center: whoever stands there sees the scene",
+        false if are_parallel => "are nearly parallel: coordinates across them are published",
         false => return None,
     };
-    Some(format!(
-        "released: records {what}, so two coordinates of each point are published: whoever looks along them sees the scene"
-    ))
+    Some(format!("released: all records {what}"))
 }
 
 /// Returns a doubt if records pass through points of others.
@@ -343,17 +343,6 @@ pub fn noise(row: &Row, threshold: f64) -> Option<String> {
          others may average the noise away"
     );
     (!threshold.is_finite() || off > NOISE * threshold).then_some(doubt)
-}
-
-/// Returns a doubt if the attack of `row` could not use most of the records, as if all lines are parallel.
-pub fn unused(row: &Row) -> Option<String> {
-    let (n, of) = (row.lost.get(Status::Degenerate.name())?, row.n_points);
-    let doubt = format!(
-        "{}: {n} of {of} points are lost because their records and those of their neighbors meet nowhere, as parallel lines: another \
-         attack may recover them",
-        row.scheme
-    );
-    (2 * n > of).then_some(doubt)
 }
 
 /// Formats three digits, with an exponent where there would be many zeros.

@@ -8,7 +8,7 @@ use super::share::Threshold;
 use crate::neighbors::oracle::Noise;
 use crate::neighbors::{Needs, Source, lacks_descriptors};
 use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
-use crate::recover::{Builtin, Delta, Solver};
+use crate::recover::{Builtin, Solver};
 use crate::seed::{Draws, Key, Stage};
 use crate::{Error, ErrorKind, Unit};
 
@@ -89,8 +89,6 @@ pub struct Plan<const D: usize> {
     pub solvers: Vec<Arc<dyn Solver<D>>>,
     /// If true, maps are also attacked by records alone, the second baseline.
     pub records_alone: bool,
-    /// Distance within which a listed record supports a position.
-    pub delta: Delta,
     /// Additional figures besides errors.
     pub measures: Vec<Arc<dyn Measure<D>>>,
     /// Errors below which a point counts as recovered.
@@ -125,7 +123,6 @@ impl<const D: usize> Plan<D> {
             k: if of_images { 20 } else { 50 },
             solvers: vec![Arc::new(Builtin::Joint)],
             records_alone: true,
-            delta: Delta::Auto,
             measures: Vec::new(),
             thresholds: thresholds.iter().flat_map(|label| Threshold::parse(label)).collect(),
             headline: if of_images { 2 } else { 0 },
