@@ -192,6 +192,7 @@ impl<const D: usize> Attack<'_, D> {
             for _ in 0..F::RERUNS {
                 estimates = settle(joint(&problem, estimates, &[]));
             }
+            peaks::place_unlisted(&mut estimates, released, lists);
             estimates
         } else {
             settle(start())

@@ -2,12 +2,43 @@
 
 use rayon::prelude::*;
 
-use crate::Error;
-use crate::density::Peaks;
+use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::rows_of;
+use crate::recover::map::{distance2, rows_of};
 use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
 use crate::released::Released;
+use crate::{Error, RowOrder};
+
+/// Places lost slots that have no list, as those whose descriptors are zeros, at the peaks of the density that the records give; of the two
+/// points of a line, at the peak farther from the other point.
+pub(super) fn place_unlisted<const D: usize>(
+    estimates: &mut [Estimate<D>],
+    released: &Released<D>,
+    lists: &Neighborhoods,
+) {
+    let is_lost = |slot: &usize| lists.of(*slot).is_empty() && !estimates[*slot].is_known();
+    let lost: Vec<usize> = (0..estimates.len()).filter(is_lost).collect();
+    let says_more = lists.scores().is_some() && lists.about().order != RowOrder::Either;
+    let Some(peaks) = (!lost.is_empty() && says_more).then(|| tomography(released)).flatten()
+    else {
+        return;
+    };
+    for slot in lost {
+        let own = slot..slot + 1;
+        let (own, other) = match released.slots_per_record() {
+            2 if estimates[slot ^ 1].is_known() => (slot & !1..(slot | 1) + 1, slot ^ 1),
+            _ => (own, slot),
+        };
+        let from = estimates[other].position;
+        let peaks = own.filter_map(|at| *peaks.of.get(at)?).map(|peak| {
+            let position: [f32; D] = std::array::from_fn(|c| peak.position[c % 3]);
+            Estimate::at(position, 0, peak.axis.into(), peak.evidence)
+        });
+        let farthest = peaks
+            .max_by(|a, b| distance2(&a.position, &from).total_cmp(&distance2(&b.position, &from)));
+        estimates[slot] = farthest.unwrap_or(estimates[slot]);
+    }
+}
 
 /// Returns the points at `peaks`.
 ///
