@@ -3,7 +3,7 @@
 //! look like protection, so each doubt is shown beside the verdict, and no gate holds with one.
 
 use unlift::audit::doubts::{
-    NeighborDistances, across, in_unit, least, noise, of_release, short, with_sign,
+    NeighborDistances, across, in_unit, least, noise, of_release, short, unused, with_sign,
 };
 use unlift::audit::{Plan, Row, Threshold};
 use unlift::evaluate::Truth;
@@ -77,13 +77,14 @@ pub(crate) fn doubts(
         let mut deltas = std::iter::once(row).chain(of_tiles).map(|row| row.delta);
         let unusual =
             deltas.find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta));
-        let of_row = unusual.map(|delta| in_unit(delta, unit)).map(|delta| {
+        let of_delta = unusual.map(|delta| in_unit(delta, unit)).map(|delta| {
             format!(
                 "{}: delta, {delta}, is far from the usual distance to the K-th neighbor, {shortest} to {longest}: recovery may be \
                  too low (try to audit separate parts of the map)",
                 row.scheme
             )
         });
+        let of_row = of_delta.or_else(|| unused(row));
         // One line per scheme is enough.
         if of_row.is_some() && !told.contains(&&row.scheme) {
             told.push(&row.scheme);
@@ -173,7 +174,7 @@ pub fn check_thresholds(
     let [smallest_text, largest_text] = [smallest, largest].map(|t| with_sign(&t.label, unit));
     let error = |text: String| {
         Error::request(format!("{option}: expected {text}")).advise(match unit {
-            Unit::Meter => "another --scale (of a released map: lengths in the unit that it states), or other --thresholds",
+            Unit::Meter => "another --scale (meters per unit; of a released map, the unit that it states), or other --thresholds",
             Unit::KthNeighbor | Unit::Pixel => "other --thresholds, or none for the usual ones",
         })
     };

@@ -36,8 +36,8 @@ pub fn usual<const D: usize>(has_descriptors: bool) -> Vec<NeighborsBy<D>> {
     best.into_iter().chain([NeighborsBy::Oracle]).collect()
 }
 
-/// Uses `learned` for SIFT whose columns have the usual order, and for other descriptors of a network's width unless lists by `similarity`
-/// agree better with themselves; `similarity` for all others.
+/// Uses `learned` for SIFT whose columns have the usual order, and for others of a network's width unless lists by `similarity` agree better
+/// with themselves; `similarity` for all others.
 #[derive(Clone, Copy, Debug)]
 struct ByDescriptors;
 
@@ -50,9 +50,9 @@ fn candidates<const D: usize>(
 ) -> (Box<dyn Source<D>>, Option<Similarity>) {
     let takes = |source: &dyn Source<D>| descriptors.is_some_and(|some| source.takes(some).is_ok());
     match (takes(&unlift_vision::network::Learned), takes(&Overlap)) {
-        (_, true) if !descriptors.is_some_and(has_usual_order) => (Box::new(Similarity), None),
         (true, is_sift) => {
-            (Box::new(unlift_vision::network::Learned), (!is_sift).then_some(Similarity))
+            let is_sure = is_sift && descriptors.is_some_and(has_usual_order);
+            (Box::new(unlift_vision::network::Learned), (!is_sure).then_some(Similarity))
         }
         (false, true) => (Box::new(Overlap), None),
         (false, false) => (Box::new(Similarity), None),

@@ -137,6 +137,12 @@ impl Neighborhoods {
         self.scores.as_deref()
     }
 
+    /// Mean length of the lists that are not empty, at least 1.
+    pub(crate) fn mean_length(&self) -> f64 {
+        let n_lists = self.offsets.windows(2).filter(|w| w[0] < w[1]).count();
+        self.records.len().max(1) as f64 / n_lists.max(1) as f64
+    }
+
     /// Length of the longest list.
     pub fn longest(&self) -> usize {
         self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)

@@ -35,7 +35,7 @@ pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
 }
 
 /// Descriptor rows sorted by content: permuting the records of a released map permutes its lists, except for equal rows. Rows of zeros
-/// say nothing and are left out: they have empty lists, and no list names them.
+/// say nothing and are left out if others suffice: they have empty lists, and no list names them.
 pub struct Rows<'a> {
     /// All descriptors, by slot, as they are compared.
     pub descriptors: Cow<'a, Descriptors>,
@@ -50,7 +50,12 @@ impl<'a> Rows<'a> {
         let descriptors = released.descriptors().ok_or_else(|| {
             Error::new("released map", "descriptors, which this source compares", "none")
         })?;
-        let rows = Self::of_map(descriptors, released, k)?;
+        let mut rows = Self::of_map(descriptors, released, k)?;
+        let is_told = |slot: &&u32| descriptors.row(**slot as usize).iter().any(|&x| x != 0.0);
+        let told: Vec<u32> = rows.slots.iter().filter(is_told).copied().collect();
+        if told.len() > rows.enough_for(k) {
+            rows.reorder(told);
+        }
         Ok(Self { descriptors: comparable(&[descriptors]).remove(0), ..rows })
     }
 
@@ -60,14 +65,13 @@ impl<'a> Rows<'a> {
         released: &Released<D>,
         k: usize,
     ) -> Result<Self, Error> {
-        let slots_per_record = released.slots_per_record();
-        let mut slots = by_content(descriptors);
-        slots.retain(|&slot| descriptors.row(slot as usize).iter().any(|&x| x != 0.0));
-        let n_records = slots.len() / slots_per_record;
+        let n_records = released.n_records();
         if k == 0 || n_records < k + 1 {
             let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
             return Err(Error::new("k", expected, k));
         }
+        let slots = by_content(descriptors);
+        let slots_per_record = released.slots_per_record();
         let records = records_of(&slots, slots_per_record);
         Ok(Self { descriptors: Cow::Borrowed(descriptors), slots, records, slots_per_record })
     }

@@ -50,8 +50,7 @@ pub(super) fn learn<const D: usize, F: Family<D>>(
         return ANCHOR_DELTA * spacing;
     }
     let beyond_edge = given.scores().map_or(BEYOND_EDGE, |_| BEYOND_EDGE_OF_SCORED);
-    let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
-    let share = per_list / released.n_records().max(1) as f64;
+    let share = given.mean_length() / released.n_records().max(1) as f64;
     // The bounds of a map may be far wider than its points, so that the share limits delta.
     let least = if D == 2 { LEAST_DELTA * spacing } else { 0.0 };
     let beyond_edge = sharp.then_some(beyond_edge);

@@ -9,7 +9,7 @@ use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_suppor
 use crate::released::Released;
 use crate::{Error, RowOrder};
 
-/// Places lost slots that have no list, as those whose descriptors are zeros, at the peaks of the density that the records give; of the two
+/// Places lost slots that have no list, such as those whose descriptors are zeros, at the peaks of the density that the records give; of the two
 /// points of a line, at the peak farther from the other point.
 pub(super) fn place_unlisted<const D: usize>(
     estimates: &mut [Estimate<D>],

@@ -304,7 +304,7 @@ fn doubts(
 ) -> (Option<String>, Option<String>) {
     let points = prepared.original.reveal().positions();
     let (empty, n) = (offsets.windows(2).filter(|w| w[0] == w[1]).count(), points.len());
-    let lost = "points have no neighbors in the file, and count as lost";
+    let lost = "points have no neighbors in the file";
     let note = (empty > 0).then(|| format!("lists: {empty} of {n} {lost}"));
     let (mut nearer, mut n) = (0usize, 0usize);
     for (point, w) in offsets.windows(2).enumerate() {
@@ -386,7 +386,7 @@ mod tests {
         assert_eq!(about(1, 5), "");
         let far = about(77, 5);
         assert!(far.starts_with("lists: the neighbors in the file are no nearer than"), "{far}");
-        let empty = "lists: 200 of 200 points have no neighbors in the file, and count as lost";
+        let empty = "lists: 200 of 200 points have no neighbors in the file";
         assert_eq!(about(1, 0), empty);
     }
 }

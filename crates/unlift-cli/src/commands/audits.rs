@@ -211,7 +211,9 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let mut request = request(&args.audit, args.k, &args.schemes, oracle, unit);
         add_solvers(&mut request.plan, &args.solvers, &mut prepared)?;
         if request.plan.schemes.iter().any(|scheme| scheme.name() == name) {
-            bail!("--name: expected another name than a scheme of --schemes, found {name}");
+            bail!(
+                "--schemes: expected other schemes than that of the release, found {name} (or --name NAME)"
+            );
         }
         request.plan.schemes.insert(0, scheme_called(&name));
         let mut audit = audit.of_map(&prepared);

@@ -21,7 +21,7 @@ use unlift::{About, OneLine, RowOrder, Unit};
 use unlift_audit::changes::{mitigations, protections_of_map};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Tally, stream};
-use unlift_audit::released::{expect_slots, same_map};
+use unlift_audit::released::{check_name, expect_slots, same_map};
 use unlift_audit::{Prepared, Progress as _, bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, OutputFile};
@@ -123,7 +123,7 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     let (released, secret) = hidden.map_err(|error| FileError::core(&args.path, error))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
     let path = out.stage(RELEASED, Kind::Stage(Stage::Released))?;
-    write_released(&path, &released, Some(name))?;
+    write_released(&path, &released, Some(name).filter(|name| check_name(name).is_ok()))?;
     out.commit()?;
     let (slots, records) = (released.n_slots(), released.n_records());
     let (dropped, folder) = (secret.dropped().len(), OneLine(args.out.display()));

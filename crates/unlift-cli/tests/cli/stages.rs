@@ -144,7 +144,7 @@ fn given_records_are_audited_with_their_truth_only() {
         ("two/truth.npz --out x", 3, "unlift: hidden/released.npz: fingerprint: expected "),
         ("hidden/truth.npz --out x --gate ppl@1:0.25<=5", 2, "scheme: expected one of olc, found ppl"),
         ("hidden/truth.npz --out x --name all", 2, "(not all), found all"),
-        ("hidden/truth.npz --out x --name olc --schemes olc", 2, "unlift: --name: expected another name"),
+        ("hidden/truth.npz --out x --name olc --schemes olc", 2, "unlift: --schemes: expected other schemes"),
     ]);
     assert!(!place.path("x").exists());
     let options = "--inlier-ratios 0.5 --neighbors oracle --neighbors similarity --no-records-alone --solver joint";

@@ -88,8 +88,9 @@ fn least(results: &Results<'_>, cards: &[Card]) -> Option<Value> {
     let times = localization.and_then(Localization::cost).map(|cost| words::significant(cost, 3));
     let (scheme, shares) = (&card.scheme, shares.join(", "));
     let has_cost = localization.is_some();
-    let all_localize = cards.iter().all(|card| verdict::localizes(results, &card.scheme));
+    let places = |card: &&Card| verdict::localizes(results, &card.scheme);
+    let is_among_useful = places(&card) && !cards.iter().all(places);
     Some(json!({
-        "scheme": scheme, "shares": shares, "has_cost": has_cost, "times": times, "all_localize": all_localize,
+        "scheme": scheme, "shares": shares, "has_cost": has_cost, "times": times, "is_among_useful": is_among_useful,
     }))
 }

@@ -10,7 +10,7 @@ use crate::evaluate::{OFF_RECORD, Truth, are_strangers, nearer_to_own, recovered
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, median};
 use crate::neighbors::{DescriptorKind, has_usual_order};
-use crate::recover::Recovered;
+use crate::recover::{Recovered, Status};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error, PointSet, Unit};
@@ -193,8 +193,7 @@ pub(super) const FEWEST: f64 = 30.0;
 /// Largest relative deviation of the lengths of descriptors that are normalized.
 const NORMALIZED: f32 = 0.03;
 
-/// Returns doubts about descriptors: in another order of rows, as those of nearest points must be alike, or of columns, where networks
-/// for SIFT are of no use. Rows of zeros are left out.
+/// Returns doubts about descriptors whose rows or columns seem to be in another order. Rows of zeros are left out.
 ///
 /// # Errors
 /// If there are no points.
@@ -211,7 +210,7 @@ pub fn of_descriptors(
     if (n as f64) < FEWEST {
         return Ok(doubts);
     }
-    let (knn, descriptors) = (Knn::new(&positions)?, descriptors.select(&told));
+    let knn = Knn::new(&positions)?;
     let rows = || (0..n).step_by(n.div_ceil(SAMPLE));
     let n_rows = rows().len() as f64;
     // The share of descriptors, each `by` rows further on, that are more like that of the nearest point than like another one.
@@ -219,8 +218,8 @@ pub fn of_descriptors(
         let mut alike = 0.0;
         for row in rows() {
             knn.nearest(row, 1, &mut nearest);
-            let like =
-                |other: usize| descriptors.squared_distance((row + by) % n, (other + by) % n);
+            let moved = |row: usize| told[(row + by) % n] as usize;
+            let like = |other: usize| descriptors.squared_distance(moved(row), moved(other));
             let near = nearest.first().map_or(f32::INFINITY, |near| like(near.1 as usize));
             let others = (1..=OTHERS).map(|at| like((row + 1 + at * (n - 1) / (OTHERS + 1)) % n));
             let more = |other: f32| if near == other { 0.5 } else { f64::from(near < other) };
@@ -231,7 +230,7 @@ pub fn of_descriptors(
     let (as_given, before, after) = (share(0), share(n - 1), share(1));
     // The share of a point deviates by 0.3, so this is three deviations.
     let chance = 0.9 / n_rows.sqrt();
-    if as_given < 0.5 + chance || before.max(after) > as_given + chance {
+    if as_given < 0.5 + chance || before.max(after) > as_given + 1.5 * chance {
         doubts.push(format!(
             "descriptors: {:.0} % are more like that of the nearest point than like another one, where 50 % are so by \
              chance, and {:.0} % if they move by one row: of another map, or in another order of rows?",
@@ -242,11 +241,11 @@ pub fn of_descriptors(
     let lengths = || told.iter().map(|&row| lengths2[row as usize].sqrt());
     let mean = lengths().sum::<f32>() / n as f32;
     let deviation2 = lengths().map(|x| (x - mean) * (x - mean)).sum::<f32>() / n as f32;
-    let is_sift = DescriptorKind::of(&descriptors, "") == Ok(DescriptorKind::Sift);
-    if is_sift && deviation2.sqrt() < NORMALIZED * mean && !has_usual_order(&descriptors) {
+    let is_sift = DescriptorKind::of(descriptors, "") == Ok(DescriptorKind::Sift);
+    if is_sift && deviation2.sqrt() < NORMALIZED * mean && !has_usual_order(descriptors) {
         doubts.push(
             "descriptors: 128 values like SIFT's, but in another order of columns (or of another kind): the best attack, a \
-             network, was not tried; write them as COLMAP does"
+             network for SIFT, finds little; write them as COLMAP does"
                 .to_owned(),
         );
     }
@@ -343,6 +342,17 @@ pub fn noise(row: &Row, threshold: f64) -> Option<String> {
          others may average the noise away"
     );
     (!threshold.is_finite() || off > NOISE * threshold).then_some(doubt)
+}
+
+/// Returns a doubt if the attack of `row` could not use most of the records, as if all lines are parallel.
+pub fn unused(row: &Row) -> Option<String> {
+    let (n, of) = (row.lost.get(Status::Degenerate.name())?, row.n_points);
+    let doubt = format!(
+        "{}: {n} of {of} points are lost because their records and those of their neighbors meet nowhere, as parallel lines: another \
+         attack may recover them",
+        row.scheme
+    );
+    (2 * n > of).then_some(doubt)
 }
 
 /// Formats three digits, with an exponent where there would be many zeros.

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use unlift::audit::{Bound, NeighborsBy, break_even};
-use unlift::neighbors::Geometric;
+use unlift::neighbors::{Geometric, Needs, Similarity, Source};
 use unlift::obfuscate::{Lifted, LocalPoints};
 
 use crate::maps::{self, *};
@@ -222,4 +222,39 @@ fn a_solver_of_ones_own_has_rows_and_loses_those_that_it_fails_on() {
     let error = run(&room(400), None, &plan, &mut Silent).unwrap_err();
     let expected = "solver: expected a name that no solver of unlift has, found joint";
     assert_eq!(error.to_string(), expected);
+}
+
+/// A source whose lists of rays are longer.
+#[derive(Debug)]
+struct ByFamily;
+
+impl Source<3> for ByFamily {
+    fn name(&self) -> &str {
+        "by-family"
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::DescriptorsAlone
+    }
+
+    fn k(&self, released: &Released<3>) -> usize {
+        if matches!(released.obfuscation(), Obfuscation::Rays(_)) { 10 } else { 7 }
+    }
+
+    fn lists(&self, released: &Released<3>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
+        Similarity.lists(released, k, seed)
+    }
+}
+
+/// A scheme's row is the same alone and after schemes with other lists, which an audit keeps.
+#[test]
+fn lists_are_kept_by_their_length() {
+    let (original, descriptors) = (room(60), random_descriptors(1, 60, 8));
+    let rows = |schemes: &[&str]| {
+        let mut plan = plan(schemes, &[0.5]);
+        plan.neighbors = vec![NeighborsBy::Source(Arc::new(ByFamily))];
+        run(&original, Some(&descriptors), &plan, &mut Silent).unwrap().rows
+    };
+    let schemes = ["olc", "ray", "plane"];
+    assert_eq!(rows(&schemes), schemes.map(|scheme| rows(&[scheme])).concat());
 }

@@ -105,7 +105,7 @@ impl Graph {
         let n_slots = lists.n_slots();
         let listers = Listers::new(lists, n_slots / slots_per_record);
         let bounds = &score_bounds(lists);
-        let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
+        let most = MOST_REVERSE * lists.mean_length().ceil() as usize;
         let edges = |slot: usize| {
             let mut edges: Vec<(u32, u8)> = Vec::new();
             let list = lists.of(slot);
@@ -236,7 +236,7 @@ mod tests {
         let own = RecordId::from_index(slot / per);
         let place = |by: usize| Some((by, lists.of(by).iter().position(|&record| record == own)?));
         let named_by: Vec<(usize, usize)> = (0..lists.n_slots()).filter_map(place).collect();
-        let most = 3 * lists.records().len().div_ceil(lists.n_slots());
+        let most = 3 * lists.mean_length().ceil() as usize;
         let reverse = named_by.iter().step_by(named_by.len().div_ceil(most).max(1));
         let list = lists.of(slot);
         let mut edges = Vec::new();
