@@ -1,11 +1,14 @@
 """Trains a network of neighborhoods: `train.py OUT DATA.. --minutes 60 [--validate FOLDER]`.
 
 DATA are folders of crops (`training_crops`), FOLDER one of whole images. OUT gets `curve.csv`, `best.safetensors` (by
-inlier ratio at 20 after the walk, on FOLDER) and `checkpoint.pt`, from which the same command goes on. Time is CPU
-time of the training alone; it sets the schedule, so that a run may be stopped at any moment but ends as planned.
+inlier ratio at 20 after the walk, on FOLDER) and `checkpoint.pt`, from which the same command goes on. Time is that
+of the training alone: CPU time, or with `--device cuda` time of the clock. It sets the schedule, so that a run may be
+stopped at any moment but ends as planned.
 """
 
 import argparse
+import concurrent.futures
+import copy
 import csv
 import dataclasses
 import math
@@ -25,7 +28,8 @@ def parsed():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("data", type=pathlib.Path, nargs="+")
-    parser.add_argument("--minutes", type=float, default=60.0, help="CPU time of the training, validation apart")
+    parser.add_argument("--minutes", type=float, default=60.0, help="time of the training, validation apart")
+    parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
     parser.add_argument("--steps", type=int, help="stop after so many steps")
     parser.add_argument("--repeat", action="store_true", help="the first batch only: its loss must fall")
     parser.add_argument("--validate", type=pathlib.Path, help="folder of whole images")
@@ -69,12 +73,13 @@ class Run:
         shape = Shape(**{field.name: getattr(options, field.name) for field in dataclasses.fields(Shape)})
         self.options = options
         self.network = weights.load(options.weights)[0] if options.weights else Network(shape)
+        self.network.to(options.device)
         self.optimizers = optimizers(self.network, options.rate, options.muon)
         self.rates = [group["lr"] for optimizer in self.optimizers for group in optimizer.param_groups]
         self.step, self.seconds, self.best = 0, 0.0, 0.0
         self.path = options.out / "checkpoint.pt"
         if self.path.exists():
-            state = torch.load(self.path, weights_only=True)
+            state = torch.load(self.path, map_location=options.device, weights_only=True)
             self.network.load_state_dict(state["network"])
             for optimizer, kept in zip(self.optimizers, state["optimizers"]):
                 optimizer.load_state_dict(kept)
@@ -97,11 +102,11 @@ class Run:
 
     def train(self, batch) -> float:
         """One step; the loss before it."""
-        descriptors, pairs, target = batch
+        descriptors, pairs, target = (part.to(self.options.device, non_blocking=True) for part in batch)
         self.set_rates()
         if self.options.half:
             pairs = pairs.bfloat16()
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.options.half):
+        with torch.autocast(self.options.device, torch.bfloat16, enabled=self.options.half):
             scores = self.network(descriptors, pairs)
         loss = loss_of(scores, target)
         loss.backward()
@@ -117,13 +122,14 @@ class Run:
         options = self.options
         if options.validate is None:
             return []
-        found = evaluate.measure(self.network, options.validate, options.images, False)
+        network = copy.deepcopy(self.network).cpu()
+        found = evaluate.measure(network, options.validate, options.images, False)
         at = evaluate.AT.index(20)
         plain, walked = found["network"][at], found["network+walk"][at]
         if walked >= self.best:
             self.best = walked
             about = {"step": str(self.step), "minutes": f"{self.seconds / 60:.1f}", "validated": f"{walked:.4f}"}
-            weights.save(self.network, options.out / "best.safetensors", about)
+            weights.save(network, options.out / "best.safetensors", about)
         return [100 * plain, 100 * walked]
 
 
@@ -135,6 +141,10 @@ def main():
     batches = data.Batches(data.shards(options.data), options.points, options.seed, options.thin)
     run = Run(options)
     fresh = run.step == 0
+    clock = time.time if options.device == "cuda" else time.process_time
+    # A thread makes the next batch while a step runs. Its CPU time counts, too.
+    pool = concurrent.futures.ThreadPoolExecutor(1)
+    ahead = pool.submit(batches.batch, 0 if options.repeat else run.step)
     with open(options.out / "curve.csv", "a" if not fresh else "w", newline="") as file:
         curve = csv.writer(file)
         if fresh:
@@ -142,9 +152,11 @@ def main():
         losses, since = [], run.seconds
         done = False
         while not done:
-            start = time.process_time()
-            losses.append(run.train(batches.batch(0 if options.repeat else run.step)))
-            run.seconds += time.process_time() - start
+            start = clock()
+            batch = ahead.result()
+            ahead = pool.submit(batches.batch, 0 if options.repeat else run.step + 1)
+            losses.append(run.train(batch))
+            run.seconds += clock() - start
             done = run.seconds >= 60 * options.minutes or run.step == options.steps
             if done or run.seconds - since >= 60 * options.every:
                 since = run.seconds
