@@ -41,18 +41,21 @@ pub fn usual<const D: usize>(has_descriptors: bool) -> Vec<NeighborsBy<D>> {
 #[derive(Clone, Copy, Debug)]
 struct ByDescriptors;
 
-/// Factor by which lists by `similarity` must agree better with themselves than those of a network (docs/decisions/sources.md).
+/// Factor by which lists by `similarity` must agree better with themselves than those of a network (docs/decisions/sources.md). A walk
+/// along the network's lists of SIFT makes these agree, so that a little less decides there.
 const BETTER: f64 = 1.08;
+const BETTER_THAN_WALK: f64 = 0.95;
 
-/// Returns the source for the kind of `descriptors`, and another one if the kind is a guess.
+/// Returns the source for the kind of `descriptors`, and another one with its factor if the kind is a guess.
 fn candidates<const D: usize>(
     descriptors: Option<&Descriptors>,
-) -> (Box<dyn Source<D>>, Option<Similarity>) {
+) -> (Box<dyn Source<D>>, Option<(Similarity, f64)>) {
     let takes = |source: &dyn Source<D>| descriptors.is_some_and(|some| source.takes(some).is_ok());
     match (takes(&unlift_vision::network::Learned), takes(&Overlap)) {
         (true, is_sift) => {
-            let is_sure = is_sift && descriptors.is_some_and(has_usual_order);
-            (Box::new(unlift_vision::network::Learned), (!is_sure).then_some(Similarity))
+            let is_sure = is_sift && (D == 2 || descriptors.is_some_and(has_usual_order));
+            let factor = if is_sift { BETTER_THAN_WALK } else { BETTER };
+            (Box::new(unlift_vision::network::Learned), (!is_sure).then_some((Similarity, factor)))
         }
         (false, true) => (Box::new(Overlap), None),
         (false, false) => (Box::new(Similarity), None),
@@ -103,10 +106,10 @@ impl<const D: usize> Source<D> for ByDescriptors {
     ) -> Result<Neighborhoods, Error> {
         let (first, second) = candidates(released.descriptors());
         let lists = first.lists_keeping(released, k, seed, kept)?;
-        let Some(second) = second else { return Ok(lists) };
+        let Some((second, factor)) = second else { return Ok(lists) };
         let others = second.lists_keeping(released, k, seed, kept)?;
         let agreement = |lists| agreement(lists, released.slots_per_record());
-        Ok(if agreement(&others) > BETTER * agreement(&lists) { others } else { lists })
+        Ok(if agreement(&others) > factor * agreement(&lists) { others } else { lists })
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {

@@ -190,7 +190,8 @@ const OTHERS: usize = 16;
 /// Smallest number of points whose figures say something.
 pub(super) const FEWEST: f64 = 30.0;
 
-/// Largest relative deviation of the lengths of descriptors that are normalized.
+/// Lengths of SIFT descriptors as bytes and as floats, and the largest relative deviation from them.
+const LENGTHS: [f32; 2] = [512.0, 1.0];
 const NORMALIZED: f32 = 0.03;
 
 /// Returns doubts about descriptors whose rows or columns seem to be in another order. Rows of zeros are left out.
@@ -241,7 +242,8 @@ pub fn of_descriptors(
     let lengths = || told.iter().map(|&row| lengths2[row as usize].sqrt());
     let mean = lengths().sum::<f32>() / n as f32;
     let deviation2 = lengths().map(|x| (x - mean) * (x - mean)).sum::<f32>() / n as f32;
-    let is_sift = DescriptorKind::of(descriptors, "") == Ok(DescriptorKind::Sift);
+    let is_sift = DescriptorKind::of(descriptors, "") == Ok(DescriptorKind::Sift)
+        && LENGTHS.iter().any(|length| (mean - length).abs() < NORMALIZED * length);
     if is_sift && deviation2.sqrt() < NORMALIZED * mean && !has_usual_order(descriptors) {
         doubts.push(
             "descriptors: 128 values like SIFT's, but in another order of columns (or of another kind): the best attack, a \
