@@ -1,4 +1,4 @@
-"""Makes the folder PROJECT for the examples: a COLMAP project of the made-up room, with SIFT-like descriptors in its database."""
+"""Makes the folder PROJECT for the examples: a COLMAP project of the made-up room, with descriptors of 64 values in its database."""
 
 import os
 import random
@@ -39,7 +39,7 @@ def descriptor(point):
     return bytes(min(255, round(512 * x / length)) for x in values)
 
 
-DIRECTIONS = [[draw.gauss(0, 0.7) for _ in range(3)] for _ in range(128)]
+DIRECTIONS = [[draw.gauss(0, 0.7) for _ in range(3)] for _ in range(64)]
 with sqlite3.connect("PROJECT/database.db") as db:
     db.execute("create table cameras (camera_id integer primary key, model integer, width integer, height integer, params blob)")
     db.execute("create table images (image_id integer primary key, name text, camera_id integer)")
@@ -49,4 +49,4 @@ with sqlite3.connect("PROJECT/database.db") as db:
     for image, found in keypoints.items():
         db.execute("insert into images values (?, ?, 1)", [image, f"room{image}.jpg"])
         db.execute("insert into keypoints values (?, ?, 2, ?)", [image, len(found), b"".join(struct.pack("<2f", x, y) for x, y, _ in found)])
-        db.execute("insert into descriptors values (?, ?, 128, ?)", [image, len(found), b"".join(descriptor(points[at]) for *_, at in found)])
+        db.execute("insert into descriptors values (?, ?, 64, ?)", [image, len(found), b"".join(descriptor(points[at]) for *_, at in found)])
