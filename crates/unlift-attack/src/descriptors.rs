@@ -108,6 +108,15 @@ impl Descriptors {
         }
     }
 
+    /// Whether row `at` has only zeros, as exporters and `drop` mark a missing descriptor.
+    pub fn is_zero(&self, at: usize) -> bool {
+        let range = at * self.dim..(at + 1) * self.dim;
+        match &self.values {
+            Values::U8(v) => v[range].iter().all(|&x| x == 0),
+            Values::F32(v) => v[range].iter().all(|&x| x == 0.0),
+        }
+    }
+
     pub(crate) fn row(&self, at: usize) -> Vec<f32> {
         let mut row = vec![0.0; self.dim];
         self.read_row(at, &mut row);

@@ -3,6 +3,7 @@
 //! The oracle makes them for experiments, a [`Source`] from a released map. [`sources::SOURCES`] lists the sources of this crate.
 
 mod bearings;
+mod columns;
 mod compare;
 mod dense;
 mod geometric;
@@ -21,6 +22,7 @@ mod walk;
 #[cfg(test)]
 use crate::released::{Lines, Obfuscation, Released};
 pub use bearings::{REAL, support};
+pub use columns::has_usual_order;
 pub use compare::KeptPairs;
 pub(crate) use compare::MOST_ROWS;
 pub use dense::{dense, usual};
@@ -28,7 +30,7 @@ pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
 pub use kept::KeptLists;
 pub(crate) use kind::comparable;
-pub use kind::{DescriptorKind, are_bits, has_usual_order};
+pub use kind::{DescriptorKind, are_bits};
 pub(crate) use mutual::{Blocks, mutual};
 pub use neighborhoods::Neighborhoods;
 pub use overlap::{Overlap, REACHES};

@@ -51,8 +51,8 @@ impl<'a> Rows<'a> {
             Error::new("released map", "descriptors, which this source compares", "none")
         })?;
         let mut rows = Self::of_map(descriptors, released, k)?;
-        let is_told = |slot: &&u32| descriptors.row(**slot as usize).iter().any(|&x| x != 0.0);
-        let told: Vec<u32> = rows.slots.iter().filter(is_told).copied().collect();
+        let told = rows.slots.iter().copied().filter(|&slot| !descriptors.is_zero(slot as usize));
+        let told: Vec<u32> = told.collect();
         if told.len() > rows.enough_for(k) {
             rows.reorder(told);
         }

@@ -203,8 +203,8 @@ fn rows_of_file(rows: &[u32], left_out: &[u64]) -> Vec<u32> {
 
 /// Returns a note about descriptors that are all zero; some exporters mark missing descriptors like this.
 pub fn zeros(descriptors: &Descriptors) -> Option<String> {
-    let is_zero = |row: &Vec<f32>| row.iter().all(|&value| value == 0.0);
-    let (n, of) = (descriptors.rows().filter(is_zero).count(), descriptors.len());
+    let of = descriptors.len();
+    let n = (0..of).filter(|&row| descriptors.is_zero(row)).count();
     let note = format!("{n} of {of} descriptors are all zero and give an attacker no information");
     (n > 0).then_some(note)
 }

@@ -190,7 +190,7 @@ const OTHERS: usize = 16;
 /// Smallest number of points whose figures say something.
 pub(super) const FEWEST: f64 = 30.0;
 
-/// Lengths of SIFT descriptors as bytes and as floats, and the largest relative deviation from them.
+/// Lengths of SIFT descriptors as bytes and as floats, and the largest mean relative deviation from one of them.
 const LENGTHS: [f32; 2] = [512.0, 1.0];
 const NORMALIZED: f32 = 0.03;
 
@@ -202,11 +202,9 @@ pub fn of_descriptors(
     points: &PointSet<3>,
     descriptors: &Descriptors,
 ) -> Result<Vec<String>, Error> {
-    let length2 = |row: Vec<f32>| row.iter().map(|x| x * x).sum::<f32>();
-    let lengths2: Vec<f32> = descriptors.rows().map(length2).collect();
-    let told = (0..lengths2.len() as u32).filter(|&row| lengths2[row as usize] > 0.0);
-    let told: Vec<u32> = told.collect();
-    let positions: Vec<_> = told.iter().map(|&row| points.positions()[row as usize]).collect();
+    let told = (0..descriptors.len()).filter(|&row| !descriptors.is_zero(row));
+    let told: Vec<usize> = told.collect();
+    let positions: Vec<_> = told.iter().map(|&row| points.positions()[row]).collect();
     let (n, mut doubts, mut nearest) = (told.len(), Vec::new(), Vec::new());
     if (n as f64) < FEWEST {
         return Ok(doubts);
@@ -219,7 +217,7 @@ pub fn of_descriptors(
         let mut alike = 0.0;
         for row in rows() {
             knn.nearest(row, 1, &mut nearest);
-            let moved = |row: usize| told[(row + by) % n] as usize;
+            let moved = |row: usize| told[(row + by) % n];
             let like = |other: usize| descriptors.squared_distance(moved(row), moved(other));
             let near = nearest.first().map_or(f32::INFINITY, |near| like(near.1 as usize));
             let others = (1..=OTHERS).map(|at| like((row + 1 + at * (n - 1) / (OTHERS + 1)) % n));
@@ -239,12 +237,12 @@ pub fn of_descriptors(
             100.0 * before.max(after)
         ));
     }
-    let lengths = || told.iter().map(|&row| lengths2[row as usize].sqrt());
-    let mean = lengths().sum::<f32>() / n as f32;
-    let deviation2 = lengths().map(|x| (x - mean) * (x - mean)).sum::<f32>() / n as f32;
+    let length = |row: Vec<f32>| row.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let lengths: Vec<f32> = descriptors.rows().map(length).filter(|&length| length > 0.0).collect();
+    let mean_off = |to: f32| lengths.iter().map(|x| (x - to).abs()).sum::<f32>() / n as f32;
     let is_sift = DescriptorKind::of(descriptors, "") == Ok(DescriptorKind::Sift)
-        && LENGTHS.iter().any(|length| (mean - length).abs() < NORMALIZED * length);
-    if is_sift && deviation2.sqrt() < NORMALIZED * mean && !has_usual_order(descriptors) {
+        && LENGTHS.iter().any(|&length| mean_off(length) < NORMALIZED * length);
+    if is_sift && !has_usual_order(descriptors) {
         doubts.push(
             "descriptors: 128 values like SIFT's, but in another order of columns (or of another kind): the best attack, a \
              network for SIFT, finds little; write them as COLMAP does"
