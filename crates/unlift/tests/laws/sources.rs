@@ -162,7 +162,29 @@ fn blank_and_equal_descriptors_are_no_trouble() {
         let lists = source.lists(&released(&rows, 1), 6, 0).unwrap();
         assert!(lists.scores().unwrap().iter().all(|score| score.is_finite()));
         assert!(lists.of(7).contains(&RecordId(8)), "{}", source.name());
+        assert!(lists.of(3).is_empty() && !lists.records().contains(&RecordId(3)));
     }
+}
+
+/// Every second point of paired lines has no list, as if its descriptor were dropped.
+#[test]
+fn points_without_a_list_are_placed_by_the_records() {
+    let hidden = hide::<3>(entry("ppl"), &synthetic::room(1, 2000).points, 1);
+    let all = hidden.lists(20, 1.0, 0);
+    let (mut offsets, mut records) = (vec![0], Vec::new());
+    for slot in 0..all.n_slots() {
+        let list = if slot % 2 == 0 { all.of(slot) } else { &[] };
+        records.extend_from_slice(list);
+        offsets.push(records.len() as u64);
+    }
+    let scores = Some(vec![0.0; records.len()]);
+    let n_records = hidden.released.n_records();
+    let lists = Neighborhoods::try_new(offsets, records, scores, n_records, 2).unwrap();
+    let lists = lists.with_about(About { by_oracle: false, ..all.about() });
+    let recovered = solve(&hidden.released, &lists, joint());
+    assert!(recovered.status().iter().all(|&status| status == Status::Ok));
+    let percent = hidden.percent_within(&recovered, 0.25);
+    assert!(percent > 60.0, "{percent}");
 }
 
 /// Lists must state their map and row order, because positions depend on both.
