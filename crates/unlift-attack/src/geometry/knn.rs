@@ -105,12 +105,12 @@ impl<'a, const D: usize> Knn<'a, D> {
     /// Finds the `k` nearest other rows of `row` (or all, if there are fewer) as (squared distance, row), sorted, into `found`.
     pub fn nearest(&self, row: usize, k: usize, found: &mut Vec<(f64, u32)>) {
         let place = self.places[row] as usize;
-        self.search(self.points[row], Some(place), k, found);
+        self.search(self.points[row], Some(place), (k, 0.0), found);
     }
 
     /// Finds the `k` nearest rows of any position, in the same form.
     pub fn nearest_to(&self, position: [f64; D], k: usize, found: &mut Vec<(f64, u32)>) {
-        self.search(position, None, k, found);
+        self.search(position, None, (k, 0.0), found);
     }
 
     /// Returns the row nearest to a position if it is within `radius`, the first of equal ones, and its squared distance.
@@ -127,12 +127,25 @@ impl<'a, const D: usize> Knn<'a, D> {
         k: impl Fn(usize) -> usize + Sync,
         of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
     ) -> Vec<T> {
-        let rows = (0..self.rows.len()).into_par_iter();
-        let value = |found: &mut Vec<_>, row| {
-            self.nearest(row, k(row), found);
-            of(row, found)
+        self.per_row_within(|row| (k(row), 0.0), of)
+    }
+
+    /// Returns what [`per_row`](Self::per_row) does. `within` returns k and the squared distance within which so many probably are,
+    /// or 0: only the time depends on it.
+    pub(crate) fn per_row_within<T: Send>(
+        &self,
+        within: impl Fn(usize) -> (usize, f64) + Sync,
+        of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
+    ) -> Vec<T> {
+        let value = |found: &mut Vec<_>, &row: &u32| {
+            let (row, place) = (row as usize, self.places[row as usize] as usize);
+            self.search(self.points[row], Some(place), within(row), found);
+            Some(of(row, found))
         };
-        rows.map_init(Vec::new, value).collect()
+        // In the order of leaves, what a query reads is cached since the one before.
+        let mut at_place: Vec<_> = self.rows.par_iter().map_init(Vec::new, value).collect();
+        let places = self.places.iter();
+        places.map(|&place| at_place[place as usize].take().expect("one row per place")).collect()
     }
 
     /// Returns the distance of every row to its `k`-th nearest other row (to the last one in small sets).
@@ -159,7 +172,13 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.leaves_within(position, (bound, usize::MAX), usize::MAX, of);
     }
 
-    fn search(&self, query: [f64; D], own: Option<usize>, k: usize, found: &mut Vec<(f64, u32)>) {
+    fn search(
+        &self,
+        query: [f64; D],
+        own: Option<usize>,
+        (k, within): (usize, f64),
+        found: &mut Vec<(f64, u32)>,
+    ) {
         found.clear();
         if k == 0 {
             return;
@@ -170,7 +189,7 @@ impl<'a, const D: usize> Knn<'a, D> {
             None => self.leaf_towards(&query),
         };
         let own = own.map_or(u32::MAX, |place| place as u32);
-        dispatch(Search { tree: self, query, own, leaf, k, found: &mut *found });
+        dispatch(Search { tree: self, query, own, leaf, k, within, found: &mut *found });
         if found.len() > k {
             found.select_nth_unstable_by_key(k - 1, canonical);
             found.truncate(k);
@@ -298,6 +317,8 @@ struct Search<'a, 'b, const D: usize> {
     own: u32,
     leaf: usize,
     k: usize,
+    /// A squared distance within which the K-th neighbor probably is, or 0.
+    within: f64,
     found: &'a mut Vec<(f64, u32)>,
 }
 
@@ -306,7 +327,16 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
 
     #[inline(always)]
     fn run(mut self) {
-        let Self { tree, k, .. } = self;
+        let Self { tree, k, within, .. } = self;
+        let (most, query) = (k + 1, self.query);
+        if within > 0.0 {
+            let all = usize::MAX;
+            tree.leaves_within(&query, (within, most), all, |places| self.take(places, within));
+            if self.found.len() >= k {
+                return;
+            }
+            self.found.clear();
+        }
         // The smallest node with so many others that their K-th distance is near the true one.
         let mut near = (1 << tree.depth) + self.leaf;
         while near > 1 && tree.range(near).len() < 2 * k + 1 {
@@ -316,7 +346,6 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
         while near > 1 && tree.is_pile(near / 2) {
             near /= 2;
         }
-        let (most, query) = (k + 1, self.query);
         self.take(tree.lowest(near, most), f64::INFINITY);
         if near == 1 {
             return;
@@ -377,6 +406,12 @@ mod tests {
                 assert_eq!(kth[row], expected.last().map_or(0.0, |last| last.0.sqrt()));
                 knn.nearest(row, k, &mut found);
                 assert_eq!([&all[row], &found], [&expected; 2], "{row}, k {k}");
+                // Whatever is said about where they probably are.
+                let near = expected.last().map_or(0.0, |last| last.0);
+                for within in [0.5 * near, near, 4.0 * near] {
+                    knn.search(*point, Some(knn.places[row] as usize), (k, within), &mut found);
+                    assert_eq!(found, expected, "{row}, k {k}, within {within}");
+                }
                 if row % 8 == 0 {
                     let query = std::array::from_fn(|c| 0.7 * point[c] + 0.4 * points[row / 2][c]);
                     knn.nearest_to(query, k, &mut found);

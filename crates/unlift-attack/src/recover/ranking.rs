@@ -11,7 +11,10 @@
 //!
 //! Each likelihood is divided by that of a far estimate, so only those within a few `R_i` count. Eight places are scored at a time.
 
+use rayon::prelude::*;
+
 use crate::geometry::knn::Knn;
+use crate::geometry::vector::squared_distance;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::{
     Candidate, Columns, Family, LANES, Lanes, Step, along_curve, distance2, evenly, known, ln,
@@ -23,6 +26,8 @@ use crate::seed::{Draws, Stage};
 
 const ITERATIONS: usize = 5;
 const SOFTNESS: f32 = 0.06;
+/// Radii rarely grow by more in an iteration; larger ones take longer to find.
+const GROWTH: f64 = 1.1;
 /// Number of iterations that search far; the others search near.
 const FAR_ITERATIONS: usize = 2;
 /// Estimates within this many radii are compared with a list.
@@ -76,26 +81,32 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     }
     let mut estimates = start.to_vec();
     let least_ratio = lists.scores().map_or(LEAST_RATIO, |_| LEAST_RATIO_OF_SOURCES);
+    let mut radius = Vec::new();
     for iteration in 0..ITERATIONS {
-        let mut radius = Vec::new();
         for half in 0..2 {
             let (slots, points) = known(&estimates);
             let tree = Knn::new(&points).ok()?;
             if half == 0 {
-                radius = radii(&tree, &slots, lists);
+                radius = radii(&tree, &slots, lists, &radius);
             }
             let [near, farther] = shares_within(problem, &estimates, &radius);
             let inlier_ratio = near.clamp(INLIER_RATIO.0, INLIER_RATIO.1);
             if half == 0 && (inlier_ratio < least_ratio || farther > MOST_FARTHER * near) {
                 return (iteration > 0).then_some(estimates);
             }
+            let near = |&row: &u32| {
+                let (slot, radius) = (slots[row as usize], radius[slots[row as usize] as usize]);
+                let inverse = if radius > 0.0 { STEEPNESS / (radius * radius) } else { 0.0 };
+                Other { x: estimates[slot as usize].position, slot, inverse }
+            };
+            let others: Vec<Other<D>> = tree.rows.par_iter().map(near).collect();
             // The chance that a wrong entry is a given record.
             let q = (1.0 - inlier_ratio) * (mean_length / n as f32);
             let context = Context {
                 problem,
                 estimates: &estimates,
                 tree: &tree,
-                slots: &slots,
+                others: &others,
                 radius: &radius,
                 odds: [(1.0 - inlier_ratio) / (1.0 - q), (inlier_ratio / q).min(LARGEST)],
                 inlier_ratio,
@@ -115,11 +126,21 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
     Some(estimates)
 }
 
-/// Returns, per slot, the distance within which as many estimates (those of `slots`) lie as its list is long; else 0.
-fn radii<const D: usize>(tree: &Knn<'_, D>, slots: &[u32], lists: &Neighborhoods) -> Vec<f32> {
-    let length = |row: usize| lists.of(slots[row] as usize).len();
-    let found =
-        tree.per_row(length, |_, found| found.last().map_or(0.0, |last| last.0.sqrt() as f32));
+/// Returns, per slot, the distance within which as many estimates (those of `slots`) lie as its list is long; else 0. Distances
+/// `before` the last moves, if any, show where to search.
+fn radii<const D: usize>(
+    tree: &Knn<'_, D>,
+    slots: &[u32],
+    lists: &Neighborhoods,
+    before: &[f32],
+) -> Vec<f32> {
+    let within = |row: usize| {
+        let slot = slots[row] as usize;
+        let reach = GROWTH * f64::from(before.get(slot).copied().unwrap_or(0.0));
+        (lists.of(slot).len(), reach * reach)
+    };
+    let last = |_, found: &[(f64, u32)]| found.last().map_or(0.0, |last| last.0.sqrt() as f32);
+    let found = tree.per_row_within(within, last);
     let mut radius = vec![0.0; lists.n_slots()];
     slots.iter().zip(found).for_each(|(&slot, found)| radius[slot as usize] = found);
     radius
@@ -160,9 +181,9 @@ fn exponential(y: f32) -> f32 {
 /// The estimates near a place, which are the terms of the log-likelihood of a slot there, with buffers.
 #[derive(Default)]
 struct Terms<const D: usize> {
-    /// Per record, whether the slot lists it, and per slot, whether it lists the slot's record.
-    listed: Vec<bool>,
-    lists: Vec<bool>,
+    /// The records that the slot lists, and the slots that list its record.
+    listed: Marks,
+    lists: Marks,
     /// Radius at the center, and the number of estimates within it.
     radius: f32,
     length: f32,
@@ -170,6 +191,35 @@ struct Terms<const D: usize> {
     terms: Vec<Term>,
     /// Per term, its squared distance to a place, and twice its component along a direction.
     aimed: Vec<[f32; 2]>,
+}
+
+/// A set of small numbers, one bit each: those of a large map stay in the cache.
+#[derive(Default)]
+struct Marks(Vec<u64>);
+
+impl Marks {
+    fn resize(&mut self, n: usize) {
+        self.0.resize(n.div_ceil(64), 0);
+    }
+
+    #[inline(always)]
+    fn set(&mut self, at: usize, to: bool) {
+        let (word, bit) = (&mut self.0[at / 64], 1 << (at % 64));
+        *word = if to { *word | bit } else { *word & !bit };
+    }
+
+    #[inline(always)]
+    fn has(&self, at: usize) -> bool {
+        self.0[at / 64] >> (at % 64) & 1 == 1
+    }
+}
+
+/// The estimate of a slot: what is read of it is together, and near estimates are near in memory.
+struct Other<const D: usize> {
+    x: [f32; D],
+    slot: u32,
+    /// `1 / R^2` in steps of steepness; 0 without a list.
+    inverse: f32,
 }
 
 /// What the estimate of one other slot contributes.
@@ -249,7 +299,8 @@ struct Context<'a, const D: usize, F: Family<D>> {
     problem: &'a Problem<'a, D, F>,
     estimates: &'a [Estimate<D>],
     tree: &'a Knn<'a, D>,
-    slots: &'a [u32],
+    /// In the tree's order.
+    others: &'a [Other<D>],
     radius: &'a [f32],
     /// Likelihood ratios of records that are surely within the radius, against records far outside: of one that is no entry, and of an entry.
     odds: [f32; 2],
@@ -364,11 +415,11 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let place = |slot: usize| &estimates[slot].position;
         let at = place(center);
         let mark = |terms: &mut Terms<D>, to: bool| {
-            lists.of(slot).iter().for_each(|record| terms.listed[record.index()] = to);
-            graph.listers.of(record).iter().for_each(|&slot| terms.lists[slot as usize] = to);
+            lists.of(slot).iter().for_each(|record| terms.listed.set(record.index(), to));
+            graph.listers.of(record).iter().for_each(|&slot| terms.lists.set(slot as usize, to));
         };
-        terms.listed.resize(estimates.len(), false);
-        terms.lists.resize(estimates.len(), false);
+        terms.listed.resize(estimates.len());
+        terms.lists.resize(estimates.len());
         mark(terms, true);
         terms.radius = radius[center];
         terms.length = lists.of(center).len() as f32;
@@ -376,31 +427,32 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         terms.away.resize(0, 0.0);
         let partner = (is_paired && estimates[slot ^ 1].is_known()).then(|| place(slot ^ 1));
         let reach = f64::from(NEAR * terms.radius);
+        let (center, reach2) = (at.map(f64::from), reach * reach);
         let mut n_near = 0;
-        self.tree.within(&at.map(f64::from), reach * reach, |row| {
-            let other = self.slots[row as usize] as usize;
-            let of = record_of(other, graph.slots_per_record);
-            if of == record {
-                return;
+        self.tree.leaves(&center, reach2, |places| {
+            for &Other { x, slot: other, inverse } in &self.others[places] {
+                let other = other as usize;
+                let of = record_of(other, graph.slots_per_record);
+                if of == record || squared_distance(&center, &x.map(f64::from)) > reach2 {
+                    continue;
+                }
+                let is_listed = terms.listed.has(of);
+                // Of the two slots of a listed record, the nearer one is meant.
+                let is_farther = is_listed && is_paired && {
+                    let (own, other_slot) = (distance2(&x, at), distance2(place(other ^ 1), at));
+                    other_slot < own || (other_slot == own && other % 2 == 1)
+                };
+                n_near += usize::from(is_listed && !is_farther);
+                let lists_slot = terms.lists.has(other);
+                let most = partner.filter(|_| lists_slot).map(|partner| distance2(partner, &x));
+                terms.terms.push(Term {
+                    inverse,
+                    own: if is_farther { 1.0 } else { odds[usize::from(is_listed)] },
+                    theirs: if inverse > 0.0 { odds[usize::from(lists_slot)] } else { 1.0 },
+                    most: most.unwrap_or(f32::INFINITY),
+                });
+                (0..D).for_each(|c| terms.away.0[c].push(x[c] - at[c]));
             }
-            let x = place(other);
-            let is_listed = terms.listed[of];
-            // Of the two slots of a listed record, the nearer one is meant.
-            let is_farther = is_listed && is_paired && {
-                let (own, other_slot) = (distance2(x, at), distance2(place(other ^ 1), at));
-                other_slot < own || (other_slot == own && other % 2 == 1)
-            };
-            n_near += usize::from(is_listed && !is_farther);
-            let lists_slot = terms.lists[other];
-            let most = partner.filter(|_| lists_slot).map(|partner| distance2(partner, x));
-            let has_list = radius[other] > 0.0;
-            terms.terms.push(Term {
-                inverse: if has_list { STEEPNESS / (radius[other] * radius[other]) } else { 0.0 },
-                own: if is_farther { 1.0 } else { odds[usize::from(is_listed)] },
-                theirs: if has_list { odds[usize::from(lists_slot)] } else { 1.0 },
-                most: most.unwrap_or(f32::INFINITY),
-            });
-            (0..D).for_each(|c| terms.away.0[c].push(x[c] - at[c]));
         });
         // Terms count in pairs.
         if terms.terms.len() % 2 == 1 {

@@ -52,10 +52,16 @@ fn score_bounds(lists: &Neighborhoods) -> Vec<f32> {
     SCORE_RANKS.iter().filter_map(at).collect()
 }
 
-/// Returns the class of the entry `at` of the list of `slot`.
-fn class_of(lists: &Neighborhoods, bounds: &[f32], side: Side, slot: usize, at: usize) -> u8 {
+/// Returns the class of the entry `at()` of the list of `slot`. The entry is looked for only if there are scores.
+fn class_of(
+    lists: &Neighborhoods,
+    bounds: &[f32],
+    side: Side,
+    slot: usize,
+    at: impl FnOnce() -> usize,
+) -> u8 {
     let class = |scores: &[f32]| {
-        let score = scores[lists.offsets()[slot] as usize + at];
+        let score = scores[lists.offsets()[slot] as usize + at()];
         bounds.partition_point(|&bound| bound <= score)
     };
     (side as usize * SCORE_CLASSES + lists.scores().map_or(0, class)) as u8
@@ -111,7 +117,7 @@ impl Graph {
             let list = lists.of(slot);
             let own = |side: Side, at: usize| {
                 let end = list[at].0 * slots_per_record as u32;
-                (end, class_of(lists, bounds, side, slot, at))
+                (end, class_of(lists, bounds, side, slot, || at))
             };
             let record = record_of(slot, slots_per_record);
             let all = listers.of(record);
@@ -129,8 +135,9 @@ impl Graph {
                     mutual = theirs;
                 } else if mutual != theirs {
                     // If a record is mutual already, its other slot adds nothing.
-                    let entry = lists.of(by as usize).partition_point(|r| r.index() < record);
-                    edges.push((by, class_of(lists, bounds, Side::Reverse, by as usize, entry)));
+                    let by = by as usize;
+                    let entry = || lists.of(by).partition_point(|r| r.index() < record);
+                    edges.push((by as u32, class_of(lists, bounds, Side::Reverse, by, entry)));
                 }
             }
             edges.extend((at..list.len()).map(|at| own(Side::Forward, at)));
