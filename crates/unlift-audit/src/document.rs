@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 use unlift::audit::{NeighborsBy, NotAudited, Plan, Row, Seconds, Threshold};
 use unlift::neighbors::Needs;
+use unlift::recover::Builtin;
 use unlift_report::{Document, RenderOptions};
 
 use crate::sources;
@@ -33,6 +34,8 @@ pub struct Tried {
     pub lacks_records_alone: bool,
     /// Whether descriptors are known and the best source for them is not tried.
     pub lacks_best_source: bool,
+    /// Whether the strongest solver is not tried.
+    pub lacks_joint: bool,
     /// Whether localization is measured.
     pub localizes: bool,
 }
@@ -55,6 +58,7 @@ impl Tried {
             thresholds: plan.thresholds.clone(),
             lacks_records_alone: D == 3 && !plan.records_alone,
             lacks_best_source: described && !plan.neighbors.iter().any(is_best),
+            lacks_joint: plan.solvers.iter().all(|by| by.builtin() != Some(Builtin::Joint)),
             localizes: false,
         }
     }

@@ -349,6 +349,10 @@ fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
         return Some("records alone were not tried, which this gate counts".to_owned());
     }
     let all = gate.solver.is_none() && gate.source.is_none();
+    let joint = Builtin::Joint.name();
+    if gate.solver.is_none() && tried.lacks_joint {
+        return Some(format!("{joint}, the strongest solver, was not tried, and none is named"));
+    }
     let best = sources::BY_DESCRIPTORS.name;
     let doubt =
         format!("neighbors by {best}, the best source, were not tried, and no attack is named");

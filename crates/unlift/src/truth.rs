@@ -247,6 +247,17 @@ impl Secret {
         exchanged
     }
 
+    /// Returns the secret of the hidden points alone, in their order among all points, and these points.
+    #[must_use]
+    pub fn of_hidden(&self) -> (Self, Vec<OriginalId>) {
+        let (mut kept, mut number) = (self.hidden.clone(), vec![0; self.n_originals]);
+        kept.sort_unstable();
+        kept.iter().enumerate().for_each(|(at, id)| number[id.index()] = at);
+        let hidden = self.hidden.iter().map(|id| OriginalId::from_index(number[id.index()]));
+        let (hidden, n_originals) = (hidden.collect(), kept.len());
+        (Self { hidden, dropped: Vec::new(), n_originals, ..self.clone() }, kept)
+    }
+
     /// Returns the points that are in no record.
     pub fn dropped(&self) -> &[Dropped] {
         &self.dropped

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use unlift::audit::doubts::of_descriptors;
 use unlift::released::Released;
-use unlift::truth::Secret;
+use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, Fingerprint, PointSet};
 use unlift_io::Error as FileError;
 use unlift_io::hash::{hash_file, hash_files, hash_positions};
@@ -21,6 +21,8 @@ pub struct Release {
     pub prepared: Prepared,
     /// The released map and the secret.
     pub hidden: (Released<3>, Secret),
+    /// The hash of all points of the truth in any order, which each release changes.
+    pub truth_sha256: String,
 }
 
 /// The files of a released map.
@@ -66,19 +68,33 @@ impl Files<'_> {
         expect_slots(self.released, &released, &secret)?;
         let of_points = self.of_points(&released, &secret)?;
         let released = self.described(released, &secret, of_points.as_ref())?;
-        let secret = secret.with_map(Some(released.fingerprint()));
-        let mut prepared = Prepared::of(original);
+        // Other schemes hide the points of this release, so that figures are of equal points.
+        let (secret, kept) = secret.with_map(Some(released.fingerprint())).of_hidden();
+        let rows: Vec<u32> = kept.iter().map(|id| id.0).collect();
+        let points = original.reveal();
+        let truth_sha256 = hash_in_any_order(points);
+        let positions = rows.iter().map(|&row| points.positions()[row as usize]).collect();
+        let hidden = PointSet::try_new(positions, points.unit());
+        let hidden = hidden.map_err(|error| FileError::core(self.truth, error))?;
+        let mut prepared = Prepared::of(Original::new(hidden));
+        let (of, n_left_out) = (points.len(), points.len() - rows.len());
+        if n_left_out > 0 {
+            let note = format!("truth: {n_left_out} of {of} points are in no record, and left out");
+            prepared.remarks.notes.push(note);
+        }
+        (prepared.rows, prepared.input.positions) = (rows, points.positions().to_vec());
         prepared.remarks.notes.extend(released.descriptors().and_then(zeros));
-        let row = |slot: Option<usize>| Some(secret.descriptor_row()[slot?]);
-        // Without the descriptors of all points, other schemes have none.
-        let order: Option<Vec<u32>> = slot_of(&secret).into_iter().map(row).collect();
-        let of_slots = || Some(released.descriptors()?.select(&order?));
-        if let Some(rows) = of_points.or_else(of_slots) {
+        let mut row_of = vec![0; secret.n_originals()];
+        for (original, row) in secret.hidden().iter().zip(secret.descriptor_row()) {
+            row_of[original.index()] = *row;
+        }
+        if let Some(descriptors) = released.descriptors() {
+            let rows = descriptors.select(&row_of);
             prepared.remarks.doubts.extend(of_descriptors(prepared.original.reveal(), &rows)?);
             // Other schemes would release the plain descriptors, which are not known here.
             prepared.descriptors = released.protected().is_none().then_some(rows);
         }
-        Ok(Release { prepared, hidden: (released, secret) })
+        Ok(Release { prepared, hidden: (released, secret), truth_sha256 })
     }
 
     /// Reads the file of descriptors, if there is one.
@@ -122,11 +138,10 @@ impl Files<'_> {
         Ok(described.with_bounds(released.bounds()))
     }
 
-    /// Returns what a report says of the files, which have these `points`. Their order, which each release changes, does not count.
-    pub fn about(&self, points: &PointSet<3>) -> Result<Input, Error> {
-        let mut positions = points.positions().to_vec();
-        positions.sort_unstable_by(|a, b| a.partial_cmp(b).expect("finite positions"));
-        let mut others = vec![("truth".to_owned(), hash_positions(&positions))];
+    /// Returns what a report says of the files.
+    pub fn about(&self, release: &Release) -> Result<Input, Error> {
+        let points = release.prepared.original.reveal();
+        let mut others = vec![("truth".to_owned(), release.truth_sha256.clone())];
         if let Some(path) = self.descriptors {
             others.push(("descriptors".to_owned(), hash_file(path)?));
         }
@@ -138,6 +153,12 @@ impl Files<'_> {
             ..Input::default()
         })
     }
+}
+
+fn hash_in_any_order(points: &PointSet<3>) -> String {
+    let mut positions = points.positions().to_vec();
+    positions.sort_unstable_by(|a, b| a.partial_cmp(b).expect("finite positions"));
+    hash_positions(&positions)
 }
 
 /// Returns the slot of each original; `None` if it is not hidden.

@@ -125,16 +125,19 @@ fn a_gate_that_no_attack_could_break_is_refused() {
 /// Ground truth of a map that was scaled later: its points are nearer to their own records than to others, but not near.
 #[test]
 fn a_truth_in_another_scale_is_no_protection() {
-    let audit = |factor: f64| {
-        let points = room().iter().map(|point| point.map(|x| factor * x)).collect();
+    let audit = |factor: f64, by: f64| {
+        let points = room().iter().map(|point| point.map(|x| factor * x + by)).collect();
         let wrong = hidden(points, Unit::Meter);
-        audit(&prepared(&room()), Some(&wrong), plan(&["olc"]), "olc:0.10<=20")
+        audit(&prepared(&room()), Some(&wrong), plan(&["olc"]), "olc:0.10<=100")
     };
-    let error = audit(0.01).expect_err("meters and centimeters").to_string();
+    let error = audit(0.01, 0.0).expect_err("meters and centimeters").to_string();
     assert!(error.contains("not measured"), "{error}");
-    let found = audit(1.3).unwrap();
+    let found = audit(1.3, 0.0).unwrap();
     let told = format!("of {N} points are 0.100 m or more away from their own records");
     assert!(reason(&found).contains(&told), "{}", reason(&found));
+    // Moved by 9 cm, no point is 10 cm away.
+    let found = audit(1.0, 0.052).unwrap();
+    assert!(reason(&found).contains("truth: half of the points are 0.0"), "{}", reason(&found));
 }
 
 /// A scheme that moves points before it hides them is measured. Its noise is part of the figures, which others may average away.
@@ -196,6 +199,10 @@ fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
     assert_eq!(said("olc:0.25<=100", both(), true), best);
     assert_eq!(said("olc:0.25<=100", both(), false), "");
     assert_eq!(said("olc@0.5:0.25<=100", both(), true), "");
+    let weaker = || Plan { solvers: Builtin::list(&[Builtin::Consensus]), ..both() };
+    let joint = "joint, the strongest solver, was not tried, and none is named";
+    assert_eq!(said("olc:0.25<=100", weaker(), false), joint);
+    assert_eq!(said("olc:consensus:0.25<=100", weaker(), false), "");
     assert_eq!(said("olc:0.25<=100", Plan { inlier_ratios: vec![1.0], ..both() }, true), "");
 }
 

@@ -200,7 +200,9 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
     };
     perform(&args.audit, &args.released, more, |audit| {
         let name = args.name.clone().map_or_else(|| files.scheme_name(), Ok)?;
-        let released::Release { mut prepared, hidden } = files.open()?;
+        let release = files.open()?;
+        let about = files.about(&release)?;
+        let released::Release { mut prepared, hidden, .. } = release;
         if let Some(range) = args.expect_extent {
             prepared.check_extent(range, None)?;
         }
@@ -223,7 +225,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let map = Map { plan, ..Map::new(&prepared) };
         let published = published_positions(&args.released)?;
         let input = Input::Released(map, Hidden { release: &hidden, published });
-        audit.about = files.about(points)?;
+        audit.about = about;
         audit.about.other_sha256.extend(hashes_of_lists(&args.solvers)?);
         audit.options.insert("released".into(), json!(true));
         // The file does not state it, so it may be a scheme of the user's own.

@@ -13,7 +13,6 @@ use unlift_report::compare::{Change, Comparison, Unmatched, compare, page};
 use super::common::read_document;
 use crate::args::CompareArgs;
 use crate::output::{print, table};
-use crate::stderr;
 
 const PAGE: &str = "compare.html";
 
@@ -35,11 +34,6 @@ pub fn run(args: &CompareArgs) -> crate::Result<bool> {
         let expected = format!("{}, as in {}", wrong.expected, args.old.display());
         Error::new(&args.new, wrong.place, expected, wrong.found)
     })?;
-    if old.input.sha256.is_none() || new.input.sha256.is_none() {
-        stderr::note(
-            "no hashes in a share-safe audit: another map of the same size and number of points, or other descriptors, cannot be noticed",
-        );
-    }
     let mut written = None;
     if let Some((out, mut files)) = out {
         let text = page(&comparison, &old, &new)?;

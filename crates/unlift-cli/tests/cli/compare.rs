@@ -25,7 +25,7 @@ fn what_leaks_more_or_is_out_of_view_fails() {
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc,ppl --inlier-ratios 1,0.5 --neighbors \
                  oracle --neighbors geometric --solver joint --quiet --out a";
     place.ends(audit, 0);
-    let changes: [Change; 10] = [
+    let changes: [Change; 12] = [
         ("was.json", |_| ()),
         ("old.json", |document| set_share(document, 40.0)),
         ("new.json", |document| set_share(document, 42.5)),
@@ -41,6 +41,13 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         ("map.json", |document| document["input"]["sha256"] = json!("0".repeat(64))),
         ("scale.json", |document| document["input"]["scale_m_per_unit"] = json!(4.0)),
         ("database.json", |document| document["input"]["other_sha256"]["descriptors"] = json!("0")),
+        ("unnamed.json", |document| document["input"]["sha256"] = json!(null)),
+        ("scheme.json", |document| {
+            let mut row = rows(document).iter().find(|row| row["neighbors"] == "geometric").cloned();
+            let row = row.as_mut().unwrap();
+            (row["scheme"], row["recovered_percent"]["0.10"]) = (json!("cp"), json!(99.9));
+            rows(document).push(row.clone());
+        }),
         ("attack.json", |document| rows(document).retain(|row| row["neighbors"] != "geometric")),
     ];
     for (name, change) in changes {
@@ -59,12 +66,14 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         ("old.json near.json", 0, usual, "0 leak more"),
         ("old.json repeated.json", 1, spread, "1 leak more"),
         ("was.json gone.json", 1, usual, "0 leak more"),
+        // A scheme that is new leaks more than all before.
+        ("was.json scheme.json", 1, usual, "1 leak more"),
     ] {
         let (text, _) = place.ends(&format!("compare {files}"), code);
         assert!(text.contains(&format!("{tolerance}{expected}")), "{files}: {text}");
         assert_eq!(text.contains("OUT OF VIEW: ppl: no row"), files.contains("gone"), "{text}");
     }
-    for name in ["map.json", "scale.json", "database.json", "attack.json"] {
+    for name in ["map.json", "scale.json", "database.json", "attack.json", "unnamed.json"] {
         let (text, _) = place.ends(&format!("compare was.json {name}"), 1);
         assert!(
             text.starts_with("NOT COMPARED: ") && text.contains("\nnot comparable: "),

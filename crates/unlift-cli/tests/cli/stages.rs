@@ -156,6 +156,15 @@ fn given_records_are_audited_with_their_truth_only() {
         let (mine, olc) = (percent("mine", by), percent("olc", by));
         assert!((mine - olc).abs() < 5.0 && percent("plane", by) < mine, "{by}: {mine}, {olc}");
     }
+    // Ours hide the points that a release hides, with its descriptors.
+    place.ends(&format!("obfuscate {MAP} --schemes olc --mitigate thin:1/2 --out part"), 0);
+    let audit = "audit released part/released.npz --truth part/truth.npz --k 10 --neighbors similarity";
+    let (_, notes) = place.ends(&format!("{audit} --name mine --schemes ppl --out b"), 0);
+    assert!(notes.contains("points are in no record, and left out"), "{notes}");
+    let document = place.json("b/audit.json");
+    assert_eq!(document["not_audited"].as_array().map_or(0, Vec::len), 0, "{document}");
+    let n = |scheme| row(&document, scheme, "similarity")["n_points"].as_u64();
+    assert!(n("mine").is_some() && n("mine") == n("ppl"), "{document}");
 }
 
 /// A release with a mitigation or protected descriptors has the figures of its audit, and `--audit` prints them.

@@ -6,6 +6,7 @@ use indexmap::IndexMap;
 use serde::Serialize;
 use serde_json::{Value, json};
 use unlift::audit::Interval;
+use unlift::recover::Builtin;
 
 use crate::attack::{self, Basis};
 use crate::document::{Bound, BreakEven, Localization, Row};
@@ -400,10 +401,20 @@ pub(crate) fn hidden(cards: &[Card]) -> impl Iterator<Item = &Card> {
     cards.iter().filter(|card| card.bearings.is_none())
 }
 
-/// Returns true if an attack on `scheme`, or on any scheme, used one of the `sources`.
-fn uses(results: &Results<'_>, scheme: Option<&str>, sources: &[&str]) -> bool {
+/// Returns true if an attack on `scheme`, or on any scheme, is such a row.
+fn tried(results: &Results<'_>, scheme: Option<&str>, is_such: impl Fn(&Row) -> bool) -> bool {
     let mut rows = results.rows.iter().filter(|row| scheme.is_none_or(|name| name == row.scheme));
-    results.is_of_releases() || rows.any(|row| sources.contains(&row.neighbors.as_str()))
+    results.is_of_releases() || rows.any(is_such)
+}
+
+/// Returns true if the lists of such an attack are by one of the `sources`.
+fn uses(results: &Results<'_>, scheme: Option<&str>, sources: &[&str]) -> bool {
+    tried(results, scheme, |row| sources.contains(&row.neighbors.as_str()))
+}
+
+/// Returns true if such an attack is that of the strongest solver.
+fn has_joint(results: &Results<'_>, scheme: Option<&str>) -> bool {
+    tried(results, scheme, |row| row.solver == Builtin::Joint.name())
 }
 
 /// Returns the best sources for descriptors. Of images, it is the network wherever there is one.
@@ -422,7 +433,11 @@ pub(crate) fn is_decided(results: &Results<'_>, scheme: Option<&str>) -> bool {
     // Two releases are not attacked by lists within one of them.
     let is_best = match results.is_sequence() {
         true => has_lists(results),
-        false => uses(results, scheme, best(results)) && !results.is_again(),
+        false => {
+            uses(results, scheme, best(results))
+                && has_joint(results, scheme)
+                && !results.is_again()
+        }
     };
     is_best && results.document.doubts.is_empty()
 }
@@ -447,8 +462,11 @@ pub(crate) fn not_tried(results: &Results<'_>) -> Option<String> {
             [true, false] => Some("the best attack by descriptors (--neighbors descriptors)"),
             [true, true] => None,
         },
+        (!has_joint(results, None)).then_some("the strongest solver (--solver joint)"),
         (!alone).then_some("the attack on the records alone"),
         images.then_some("several queries with known poses (unlift audit sequence)"),
+        (!images && !results.rows.iter().any(|row| attack::is_oracle(&row.neighbors)))
+            .then_some("lists with known neighbors (--neighbors oracle)"),
     ];
     let named = results.document.options.get("name").and_then(|name| name.as_str());
     let is_own = |name: &str| words::scheme_rule(name).is_empty() || named == Some(name);

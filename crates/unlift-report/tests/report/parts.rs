@@ -44,6 +44,7 @@ fn the_cost_of_protection_has_a_sentence_a_chart_and_a_table() {
         let mut document = document(protects);
         for row in &mut document.results {
             (row.neighbors, row.oracle_noise) = ("descriptors".to_owned(), None);
+            row.solver = row.solver.replace("consensus", "joint");
         }
         document
     };
@@ -99,6 +100,7 @@ fn a_scheme_that_does_not_localize_is_no_advice() {
     let mut document = document(false);
     for row in &mut document.results {
         (row.neighbors, row.oracle_noise) = ("descriptors".to_owned(), None);
+        row.solver = row.solver.replace("consensus", "joint");
         sample::set(row, if row.scheme == "plane" { 5.0 } else { 12.0 }, 1.0);
     }
     let text = page(&document, None, false);

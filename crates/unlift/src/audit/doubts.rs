@@ -105,6 +105,7 @@ pub fn of_release(
     let away = if is_usual { Vec::new() } else { truth.away_from_own() };
     rounded(truth.usual_rounding(), least, unit)
         .or_else(|| strays(false, &away, least, unit))
+        .or_else(|| moved(away, least, unit))
         .or_else(|| mistaken_unit(unit, k, middle))
         .or_else(|| crossings(truth.through_others()))
         .or_else(|| of_directions(truth.released.obfuscation()))
@@ -174,6 +175,17 @@ fn strays(recovered: bool, away: &[f64], least: f64, unit: Unit) -> Option<Strin
     (n as f64 > STRAY * of as f64).then_some(doubt)
 }
 
+/// Returns a doubt if most points are off their own records, all of them by less than the smallest threshold.
+fn moved(mut away: Vec<f64>, least: f64, unit: Unit) -> Option<String> {
+    let middle = if away.is_empty() { 0.0 } else { median(&mut away) };
+    let off = in_unit(middle, unit);
+    let doubt = format!(
+        "truth: half of the points are {off} or more away from their own records, so attacks miss by that much: check that it is \
+         of this map, in its frame and scale"
+    );
+    (middle > NOISE * least).then_some(doubt)
+}
+
 /// Returns a doubt if lengths are not in the unit that a file states.
 fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
     let (is_usual, found) = ((UNIT[0]..=UNIT[1]).contains(&middle), short(middle));
@@ -194,7 +206,10 @@ pub(super) const FEWEST: f64 = 30.0;
 const LENGTHS: [f32; 2] = [512.0, 1.0];
 const NORMALIZED: f32 = 0.03;
 
-/// Returns doubts about descriptors whose rows or columns seem to be in another order. Rows of zeros are left out.
+/// Descriptors of fewer values are no features.
+const SHORTEST: usize = 8;
+
+/// Returns doubts about descriptors that are too short, or whose rows or columns seem to be in another order. Rows of zeros are left out.
 ///
 /// # Errors
 /// If there are no points.
@@ -236,6 +251,10 @@ pub fn of_descriptors(
             100.0 * as_given,
             100.0 * before.max(after)
         ));
+    }
+    if descriptors.dim() < SHORTEST {
+        let dim = descriptors.dim();
+        doubts.push(format!("descriptors: of length {dim}, too short for features"));
     }
     let length = |row: Vec<f32>| row.iter().map(|x| x * x).sum::<f32>().sqrt();
     let lengths: Vec<f32> = descriptors.rows().map(length).filter(|&length| length > 0.0).collect();

@@ -15,7 +15,7 @@ use crate::{Error, OriginalId};
 /// Registry entry.
 pub const ENTRY: Entry = Entry {
     title: "Ray cloud, two centers",
-    rule: "Each point becomes a ray from one of two published centers.",
+    rule: "Each point becomes a ray from one of two published centers; seen from there, the rays are a picture of the scene.",
     color: 3,
     source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
     hidden: "the range from the center (1 of 3 coordinates)",
@@ -38,7 +38,7 @@ fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lif
 pub const VOXEL: Entry = Entry {
     name: "ray-voxel",
     title: "Ray cloud, voxel parity",
-    rule: "Each point becomes a ray from one of two published centers; the voxel of the point decides which.",
+    rule: "Each point becomes a ray from one of two published centers, by its voxel; seen from there, the rays are a picture of the scene.",
     color: 4,
     patents: "as ray",
     lift: Lift::In3d(lift_by_voxel),
