@@ -206,6 +206,15 @@ fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
     assert_eq!(said("olc:0.25<=100", Plan { inlier_ratios: vec![1.0], ..both() }, true), "");
 }
 
+#[test]
+fn descriptors_that_are_too_short_for_features_are_doubted() {
+    let values = (0..N * 4).map(|at| (at * 37 % 101) as u8).collect();
+    let points = PointSet::try_new(room(), Unit::Meter).unwrap();
+    let descriptors = Descriptors::try_new(Values::U8(values), 4).unwrap();
+    let doubts = of_descriptors(&points, &descriptors).unwrap().concat();
+    assert!(doubts.contains("descriptors: of length 4, too short"), "{doubts}");
+}
+
 /// Ten orders of the rows of each real scene. Of every part of a map, as filters leave it, the right order passes.
 #[test]
 fn descriptors_of_real_maps_are_told_from_those_in_another_order() {
