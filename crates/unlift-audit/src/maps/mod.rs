@@ -387,7 +387,10 @@ mod tests {
         };
         assert_eq!(about(1, 5), "");
         let far = about(77, 5);
-        assert!(far.starts_with("lists: the neighbors in the file are hardly nearer than"), "{far}");
+        assert!(
+            far.starts_with("lists: the neighbors in the file are hardly nearer than"),
+            "{far}"
+        );
         let empty = "lists: 200 of 200 points have no neighbors in the file";
         assert_eq!(about(1, 0), empty);
     }
