@@ -350,7 +350,7 @@ fn untried(gate: &Gate, tried: &Tried) -> Option<String> {
     }
     let all = gate.solver.is_none() && gate.source.is_none();
     let joint = Builtin::Joint.name();
-    if gate.solver.is_none() && tried.lacks_joint {
+    if gate.counts_baselines() && tried.lacks_joint {
         return Some(format!("{joint}, the strongest solver, was not tried, and none is named"));
     }
     let best = sources::BY_DESCRIPTORS.name;
