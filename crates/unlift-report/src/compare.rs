@@ -312,12 +312,11 @@ pub(crate) fn different(a: &Input, b: &Input) -> Vec<Incomparable> {
     }
     // A scheme may release one truth in any number of files.
     let has_truth = [a, b].iter().all(|input| input.other_sha256.contains_key("truth"));
-    let hash = |of: &Input| of.sha256.clone().unwrap_or("none (--share-safe)".to_owned());
-    if a.sha256.is_none() || b.sha256.is_none() || !has_truth {
-        let [place, expected, found] = ["hash of the map or images".into(), hash(a), hash(b)];
-        if a.sha256.is_none() || expected != found {
-            different.push(Incomparable { place, expected, found });
-        }
+    let [was, is] = [a, b].map(|of| of.sha256.as_deref());
+    if was.is_none() || (was != is && !(has_truth && is.is_some())) {
+        let hash = |of: Option<&str>| of.unwrap_or("none (--share-safe)").to_owned();
+        let (place, expected, found) = ("hash of the map or images".into(), hash(was), hash(is));
+        different.push(Incomparable { place, expected, found });
     }
     different
 }

@@ -94,19 +94,19 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             if half == 0 && (inlier_ratio < least_ratio || farther > MOST_FARTHER * near) {
                 return (iteration > 0).then_some(estimates);
             }
-            let near = |&row: &u32| {
+            let entry = |&row: &u32| {
                 let (slot, radius) = (slots[row as usize], radius[slots[row as usize] as usize]);
                 let inverse = if radius > 0.0 { STEEPNESS / (radius * radius) } else { 0.0 };
-                Other { x: estimates[slot as usize].position, slot, inverse }
+                TreeEntry { x: estimates[slot as usize].position, slot, inverse }
             };
-            let others: Vec<Other<D>> = tree.rows.par_iter().map(near).collect();
+            let entries: Vec<TreeEntry<D>> = tree.rows.par_iter().map(entry).collect();
             // The chance that a wrong entry is a given record.
             let q = (1.0 - inlier_ratio) * (mean_length / n as f32);
             let context = Context {
                 problem,
                 estimates: &estimates,
                 tree: &tree,
-                others: &others,
+                entries: &entries,
                 radius: &radius,
                 odds: [(1.0 - inlier_ratio) / (1.0 - q), (inlier_ratio / q).min(LARGEST)],
                 inlier_ratio,
@@ -214,8 +214,8 @@ impl Marks {
     }
 }
 
-/// The estimate of a slot: what is read of it is together, and near estimates are near in memory.
-struct Other<const D: usize> {
+/// What the likelihood reads of an estimate. In the tree's order, near estimates are near in memory.
+struct TreeEntry<const D: usize> {
     x: [f32; D],
     slot: u32,
     /// `1 / R^2` in steps of steepness; 0 without a list.
@@ -300,7 +300,7 @@ struct Context<'a, const D: usize, F: Family<D>> {
     estimates: &'a [Estimate<D>],
     tree: &'a Knn<'a, D>,
     /// In the tree's order.
-    others: &'a [Other<D>],
+    entries: &'a [TreeEntry<D>],
     radius: &'a [f32],
     /// Likelihood ratios of records that are surely within the radius, against records far outside: of one that is no entry, and of an entry.
     odds: [f32; 2],
@@ -430,7 +430,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let (center, reach2) = (at.map(f64::from), reach * reach);
         let mut n_near = 0;
         self.tree.leaves(&center, reach2, |places| {
-            for &Other { x, slot: other, inverse } in &self.others[places] {
+            for &TreeEntry { x, slot: other, inverse } in &self.entries[places] {
                 let other = other as usize;
                 let of = record_of(other, graph.slots_per_record);
                 if of == record || squared_distance(&center, &x.map(f64::from)) > reach2 {
