@@ -25,20 +25,26 @@ pub struct Neighborhoods(pub Arc<neighbors::Neighborhoods>);
 
 #[pymethods]
 impl Neighborhoods {
-    /// Converts an array `(n_slots, k)` of records of `released`, padded by -1, and optional scores of the same shape.
+    /// Converts an array `(n_slots, k)` of records of `released`, padded by -1, and optional scores of the same shape. For lines through
+    /// two points, `slots` may have the slot of each record that is meant: lists that say it recover more.
     #[new]
-    #[pyo3(signature = (released, records, scores=None, *, needs="descriptors"))]
+    #[pyo3(signature = (released, records, scores=None, *, slots=None, needs="descriptors"))]
     fn new(
         released: &Bound<'_, PyAny>,
         records: &Bound<'_, PyAny>,
         scores: Option<&Bound<'_, PyAny>>,
+        slots: Option<&Bound<'_, PyAny>>,
         needs: &str,
     ) -> PyResult<Self> {
         let needs = needs_of(needs)?;
         let lists = of_either!(&released_of(released)?.0, released => {
-            lists_of(released, records, scores, usize::MAX, needs)
+            let lists = lists_of(released, records, scores, usize::MAX, needs);
+            let Some(slots) = slots else { return Ok(Self(Arc::new(lists?))) };
+            let (slots, _) = whole("slots", slots, &[2], -1..=released.n_slots() as i64 - 1)?;
+            let slots = slots.into_iter().filter(|&slot| slot >= 0).map(|slot| slot as u32);
+            lists?.naming(slots.collect(), released.slots_per_record())
         });
-        Ok(Self(Arc::new(lists?)))
+        Ok(Self(Arc::new(lists.map_err(raised)?)))
     }
 
     /// Reads lists of `released` (`.npz`).
@@ -69,6 +75,12 @@ impl Neighborhoods {
     #[getter]
     fn records<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         to_array(py, self.0.records().iter().map(|record| record.0).collect()).into_any()
+    }
+
+    /// The slot of each record that is meant, or None.
+    #[getter]
+    fn slots<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyAny>> {
+        self.0.slots().map(|slots| to_array(py, slots.to_vec()).into_any())
     }
 
     /// Start of each list in `records`, and the total number of entries.

@@ -39,6 +39,20 @@ def test_records_are_those_of_the_array_in_every_kind_of_number(points, dtype):
         np.testing.assert_array_equal(unlift.Neighborhoods(some, rows).records, np.sort(rows[:, [0, 2]], 1).ravel())
 
 
+def test_lists_of_paired_lines_may_name_slots(points, tmp_path):
+    paired = unlift.obfuscate(unlift.Map(points[:40], scale=1.0), "ppl", seed=1)
+    slots = (np.arange(40)[:, None] // 2 * 2 + [2, 5, -38]) % 40
+    slots[0, 2] = -1
+    lists = unlift.Neighborhoods(paired, np.where(slots < 0, -1, slots // 2), slots=slots)
+    np.testing.assert_array_equal(lists.slots // 2, lists.records)
+    lists.save(tmp_path / "lists.npz")
+    read = unlift.Neighborhoods.read(tmp_path / "lists.npz", paired)
+    np.testing.assert_array_equal(read.slots, lists.slots)
+    assert unlift.Neighborhoods(paired, slots // 2).slots is None
+    with pytest.raises(ValueError, match="neighborhood of slot 0: expected a slot of record 1, found 4"):
+        unlift.Neighborhoods(paired, slots // 2, slots=np.where(slots == 2, 4, slots))
+
+
 def broken(points):
     return unlift.Lines(points + 1.0, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
 

@@ -1,5 +1,7 @@
 //! Lists of records per slot, in compressed rows.
 
+use std::ops::Range;
+
 use crate::released::Released;
 use crate::{About, Error, RecordId, RowOrder};
 
@@ -10,6 +12,8 @@ pub struct Neighborhoods {
     offsets: Vec<u64>,
     records: Vec<RecordId>,
     scores: Option<Vec<f32>>,
+    /// Per entry, the slot that it names: one of those of its record.
+    slots: Option<Vec<u32>>,
     about: About,
 }
 
@@ -61,7 +65,7 @@ impl Neighborhoods {
                 return wrong("other records".into(), format!("its own record {}", own.0));
             }
         }
-        Ok(Self { offsets, records, scores, about: About::default() })
+        Ok(Self { offsets, records, scores, slots: None, about: About::default() })
     }
 
     /// Creates lists of a released map from the (score, record) of each slot, in any order.
@@ -91,13 +95,36 @@ impl Neighborhoods {
 
     /// Creates lists from rows of checked lists, without checks.
     pub(crate) fn unchecked(offsets: Vec<u64>, records: Vec<RecordId>) -> Self {
-        Self { offsets, records, scores: None, about: About::default() }
+        Self { offsets, records, scores: None, slots: None, about: About::default() }
     }
 
     /// Sets the released map and the row order of the lists.
     #[must_use]
     pub fn with_about(self, about: About) -> Self {
         Self { about, ..self }
+    }
+
+    /// Adds which of the `slots_per_record` points of its record each entry means, which lists from descriptors of points tell. `slots` has
+    /// the slots of one list after the other, those of a list in any order.
+    ///
+    /// # Errors
+    /// When a list has other slots than one of each of its records.
+    pub fn naming(mut self, mut slots: Vec<u32>, slots_per_record: usize) -> Result<Self, Error> {
+        Error::check_len("slots of neighborhoods", slots.len(), self.records.len(), " entries")?;
+        for slot in 0..self.n_slots() {
+            let named = &mut slots[self.range(slot)];
+            named.sort_unstable();
+            let pairs = named.iter().zip(self.of(slot));
+            let is_other = |&(&named, record): &(&u32, &RecordId)| {
+                named as usize / slots_per_record != record.index()
+            };
+            if let Some((named, record)) = { pairs }.find(is_other) {
+                let what = format!("neighborhood of slot {slot}");
+                return Err(Error::new(what, format!("a slot of record {}", record.0), named));
+            }
+        }
+        self.slots = Some(slots);
+        Ok(self)
     }
 
     /// The released map and the row order of the lists.
@@ -110,16 +137,39 @@ impl Neighborhoods {
         self.offsets.len() - 1
     }
 
+    /// The range of the list of `slot` in the columns of entries.
+    #[inline(always)]
+    pub(crate) fn range(&self, slot: usize) -> Range<usize> {
+        self.offsets[slot] as usize..self.offsets[slot + 1] as usize
+    }
+
     /// The records listed for `slot`, ascending.
     #[inline(always)]
     pub fn of(&self, slot: usize) -> &[RecordId] {
-        &self.records[self.offsets[slot] as usize..self.offsets[slot + 1] as usize]
+        &self.records[self.range(slot)]
     }
 
     /// The scores of [`of`](Self::of), if the source gave any.
     pub fn scores_of(&self, slot: usize) -> Option<&[f32]> {
-        let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
-        self.scores.as_ref().map(|scores| &scores[range])
+        self.scores.as_ref().map(|scores| &scores[self.range(slot)])
+    }
+
+    /// What an entry names: a slot if lists name slots, else a record.
+    #[inline(always)]
+    pub(crate) fn target(&self, slot: usize, at: usize) -> usize {
+        let at = self.offsets[slot] as usize + at;
+        self.slots.as_ref().map_or_else(|| self.records[at].index(), |slots| slots[at] as usize)
+    }
+
+    /// What the entries of `slot` name, ascending.
+    #[inline(always)]
+    pub(crate) fn targets(&self, slot: usize) -> impl ExactSizeIterator<Item = usize> {
+        (0..self.range(slot).len()).map(move |at| self.target(slot, at))
+    }
+
+    /// Number of slots that an entry may mean, if records have `slots_per_record`.
+    pub(crate) fn slots_per_target(&self, slots_per_record: usize) -> usize {
+        if self.slots.is_some() { 1 } else { slots_per_record }
     }
 
     /// All lists, one after another.
@@ -130,6 +180,11 @@ impl Neighborhoods {
     /// Start of each list; one more entry than there are slots.
     pub fn offsets(&self) -> &[u64] {
         &self.offsets
+    }
+
+    /// The slots of the records that are meant, if the source tells them.
+    pub fn slots(&self) -> Option<&[u32]> {
+        self.slots.as_deref()
     }
 
     /// All scores, if the source gave any.

@@ -114,16 +114,23 @@ impl<'a> Rows<'a> {
         for (ranked, &slot) in ranked.iter().zip(&self.slots) {
             ranked_of[slot as usize] = ranked;
         }
+        let mut named = Vec::new();
         let list = |ranked: &[(f32, u32)]| {
             let mut list: Vec<(f32, RecordId)> = Vec::with_capacity(k);
             for &(score, partner) in ranked {
                 let record = RecordId(self.records[partner as usize]);
                 if list.len() < k && list.iter().all(|&(_, listed)| listed != record) {
                     list.push((score, record));
+                    named.push(self.slots[partner as usize]);
                 }
             }
             list
         };
-        Neighborhoods::scored(ranked_of.into_iter().map(list), released, RowOrder::DescriptorRows)
+        let rows = ranked_of.into_iter().map(list);
+        let lists = Neighborhoods::scored(rows, released, RowOrder::DescriptorRows)?;
+        match self.slots_per_record {
+            1 => Ok(lists),
+            several => lists.naming(named, several),
+        }
     }
 }

@@ -168,8 +168,7 @@ impl<const D: usize> Attack<'_, D> {
         let is_joint = solver == Builtin::Joint;
         // Joint recovery reads lists in both directions from its start on.
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
-        let both_ways = graph.as_ref().filter(|_| released.slots_per_record() == 1);
-        let both_ways = both_ways.map(Graph::neighborhoods);
+        let both_ways = graph.as_ref().and_then(Graph::neighborhoods);
         let used = both_ways.as_ref().unwrap_or(lists);
         let delta = match self.options.delta {
             Delta::Fixed(delta) => delta,
@@ -236,8 +235,9 @@ fn joint<const D: usize, F: Family<D>>(
     if let Some(rays) = family.anchored().filter(|_| known.is_empty()) {
         estimates = anchors::layout::recover(rays, (lists, &graph.listers), estimates);
     }
-    // The likeliest places under whole lists, or under their entries where the rest says too little. Paired lines would lose by beliefs.
-    let with_beliefs = graph.slots_per_record == 1 && lists.scores().is_some();
+    // The likeliest places under whole lists, or under their entries where the rest says too little. If entries mean either point of a
+    // line, beliefs would lose.
+    let with_beliefs = graph.slots_per_target == 1 && lists.scores().is_some();
     restore(match ranking::recover(problem, &estimates) {
         Some(ranked) => ranked,
         None if with_beliefs => beliefs::recover(problem, estimates),

@@ -154,8 +154,8 @@ fn shares_within<const D: usize, F: Family<D>>(
 ) -> [f32; 2] {
     let (mut within, mut all) = ([0; 2], 0);
     for slot in evenly(estimates.len(), 1 << 12).filter(|&slot| radius[slot] > 0.0) {
-        for record in problem.lists.of(slot) {
-            let ends = problem.graph.slots_of(record.index());
+        for target in problem.lists.targets(slot) {
+            let ends = problem.graph.slots_of(target);
             let nearest = nearest2(estimates, ends, &estimates[slot].position);
             let is_within = |times: f32| usize::from(nearest < (times * radius[slot]).powi(2));
             within = [within[0] + is_within(REACH), within[1] + is_within(FARTHER)];
@@ -386,10 +386,10 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     #[inline(never)]
     fn try_elsewhere(&self, slot: usize, best: &mut Candidate<D>, terms: &mut Terms<D>) {
         let Problem { family, lists, graph, seed, .. } = self.problem;
-        let own = lists.of(slot);
+        let n_listed = lists.of(slot).len();
         let mut draws = Draws::new(*seed, Stage::Ranking, u64::MAX - slot as u64);
-        for record in evenly(own.len(), ELSEWHERE).map(|at| own[at]) {
-            for center in graph.slots_of(record.index()) {
+        for at in evenly(n_listed, ELSEWHERE) {
+            for center in graph.slots_of(lists.target(slot, at)) {
                 let (x, radius) = (self.estimates[center].position, self.radius[center]);
                 if !family.is_near(slot, &x, radius * radius) {
                     continue;
@@ -410,13 +410,14 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     #[inline(always)]
     fn collect(&self, slot: usize, center: usize, terms: &mut Terms<D>) -> usize {
         let Self { problem: Problem { lists, graph, .. }, estimates, radius, odds, .. } = *self;
-        let is_paired = graph.slots_per_record == 2;
+        let is_either = graph.slots_per_target == 2;
         let record = record_of(slot, graph.slots_per_record);
         let place = |slot: usize| &estimates[slot].position;
         let at = place(center);
         let mark = |terms: &mut Terms<D>, to: bool| {
-            lists.of(slot).iter().for_each(|record| terms.listed.set(record.index(), to));
-            graph.listers.of(record).iter().for_each(|&slot| terms.lists.set(slot as usize, to));
+            lists.targets(slot).for_each(|target| terms.listed.set(target, to));
+            let listers = graph.listers.of(record_of(slot, graph.slots_per_target));
+            listers.iter().for_each(|&slot| terms.lists.set(slot as usize, to));
         };
         terms.listed.resize(estimates.len());
         terms.lists.resize(estimates.len());
@@ -425,7 +426,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         terms.length = lists.of(center).len() as f32;
         terms.terms.clear();
         terms.away.resize(0, 0.0);
-        let partner = (is_paired && estimates[slot ^ 1].is_known()).then(|| place(slot ^ 1));
+        let partner = (is_either && estimates[slot ^ 1].is_known()).then(|| place(slot ^ 1));
         let reach = f64::from(NEAR * terms.radius);
         let (center, reach2) = (at.map(f64::from), reach * reach);
         let mut n_near = 0;
@@ -436,9 +437,9 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 if of == record || squared_distance(&center, &x.map(f64::from)) > reach2 {
                     continue;
                 }
-                let is_listed = terms.listed.has(of);
+                let is_listed = terms.listed.has(record_of(other, graph.slots_per_target));
                 // Of the two slots of a listed record, the nearer one is meant.
-                let is_farther = is_listed && is_paired && {
+                let is_farther = is_listed && is_either && {
                     let (own, other_slot) = (distance2(&x, at), distance2(place(other ^ 1), at));
                     other_slot < own || (other_slot == own && other % 2 == 1)
                 };

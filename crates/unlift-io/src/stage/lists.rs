@@ -11,7 +11,7 @@ use super::write::{Written, write_file};
 use crate::Error;
 use crate::atomic::Access;
 
-/// Writes neighborhoods, one row per slot: `records` and, if present, `scores`. Shorter lists end with -1 (and a score of NaN).
+/// Writes neighborhoods, one row per slot: `records` and, if present, `slots` and `scores`. Shorter lists end with -1 (and a score of NaN).
 pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result<(), Error> {
     write_file(path, Access::Private, written(neighborhoods))
 }
@@ -20,11 +20,17 @@ pub(super) fn written(lists: &Neighborhoods) -> Written<'_> {
     let (n, k) = (lists.n_slots(), lists.longest());
     let mut written = Written::new(Kind::Neighborhoods, n);
     written.state_about(lists.about());
-    let records = (0..n).flat_map(move |slot| {
-        let list = lists.of(slot).iter().map(|record| record.0 as i32);
-        list.chain(std::iter::repeat(-1)).take(k)
-    });
+    let padded = move |slot: usize, entry: &dyn Fn(usize) -> u32| -> Vec<i32> {
+        let list = lists.offsets()[slot] as usize..lists.offsets()[slot + 1] as usize;
+        let list = list.map(|at| entry(at) as i32);
+        list.chain(std::iter::repeat(-1)).take(k).collect()
+    };
+    let records = (0..n).flat_map(move |slot| padded(slot, &|at| lists.records()[at].0));
     written.array("records", &[n, k], records);
+    if let Some(slots) = lists.slots() {
+        let slots = (0..n).flat_map(move |slot| padded(slot, &|at| slots[at]));
+        written.array("slots", &[n, k], slots);
+    }
     if lists.scores().is_some() {
         let scores = (0..n).flat_map(move |slot| {
             let scores = lists.scores_of(slot).unwrap_or_default().iter().copied();
@@ -56,7 +62,14 @@ pub(super) fn neighborhoods_of(
 ) -> Result<Neighborhoods, Error> {
     arrays.expect(Kind::Neighborhoods)?;
     let about = arrays.meta.about()?;
-    let lists = lists_of(arrays, "records", n_records, slots_per_record)?;
+    let mut lists = lists_of(arrays, "records", n_records, slots_per_record)?;
+    let n_slots = n_records * slots_per_record;
+    let named = |name: &str| Ok(arrays.integers(name, [Some(n_slots), None], n_slots, true)?.0);
+    if let Some(mut slots) = arrays.optional("slots", named)? {
+        slots.retain(|&slot| slot != NONE);
+        let named = lists.naming(slots, slots_per_record);
+        lists = named.map_err(|source| arrays.refused(source))?;
+    }
     Ok(lists.with_about(about))
 }
 

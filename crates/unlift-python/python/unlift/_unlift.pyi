@@ -170,6 +170,7 @@ class Neighborhoods:
         records: npt.ArrayLike,
         scores: npt.ArrayLike | None = None,
         *,
+        slots: npt.ArrayLike | None = None,
         needs: str = "descriptors",
     ) -> Neighborhoods: ...
     @staticmethod
@@ -178,6 +179,8 @@ class Neighborhoods:
     def __len__(self) -> int: ...
     @property
     def records(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def slots(self) -> npt.NDArray[np.uint32] | None: ...
     @property
     def offsets(self) -> npt.NDArray[np.uint64]: ...
     @property

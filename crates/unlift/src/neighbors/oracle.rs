@@ -238,25 +238,30 @@ pub fn from_points(
     let n_scores = scores.map_or(n_entries, <[_]>::len);
     Error::check_len("scores of neighbors by point", n_scores, n_entries, " rows")?;
     let slots_per_record = secret.slots_per_record();
-    let record_of = record_of_originals(secret);
-    let (mut rows, mut records) = (vec![0u64], Vec::new());
+    let mut slot_of = vec![None; n];
+    secret.hidden().iter().enumerate().for_each(|(slot, of)| slot_of[of.index()] = Some(slot));
+    let (mut rows, mut records, mut named) = (vec![0u64], Vec::new(), Vec::new());
     let mut kept_scores = scores.map(|_| Vec::new());
     for (slot, original) in secret.hidden().iter().enumerate() {
         let own = RecordId::from_index(slot / slots_per_record);
         let start = records.len();
         for at in offsets[original.index()] as usize..offsets[original.index() + 1] as usize {
-            if let Some(record) = record_of[neighbors[at] as usize]
-                && record != own
-                && !records[start..].contains(&record)
-            {
+            let Some(near) = slot_of[neighbors[at] as usize] else { continue };
+            let record = RecordId::from_index(near / slots_per_record);
+            if record != own && !records[start..].contains(&record) {
                 records.push(record);
+                named.push(near as u32);
                 kept_scores.iter_mut().zip(scores).for_each(|(kept, all)| kept.push(all[at]));
             }
         }
         rows.push(records.len() as u64);
     }
     let n_records = secret.n_slots() / slots_per_record;
-    let lists = Neighborhoods::try_new(rows, records, kept_scores, n_records, slots_per_record)?;
+    let mut lists =
+        Neighborhoods::try_new(rows, records, kept_scores, n_records, slots_per_record)?;
+    if slots_per_record > 1 {
+        lists = lists.naming(named, slots_per_record)?;
+    }
     Ok(lists.with_about(About { map: secret.map(), order: RowOrder::Slots, ..About::default() }))
 }
 

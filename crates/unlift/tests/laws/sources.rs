@@ -187,6 +187,35 @@ fn points_without_a_list_are_placed_by_the_records() {
     assert!(percent > 60.0, "{percent}");
 }
 
+/// Lists of points, as sources make them from descriptors, name a point of a line; lists of lines leave open which of the two is meant.
+#[test]
+fn lists_that_name_points_recover_more_than_lists_of_lines() {
+    let points = synthetic::room(1, 3000).points;
+    let hidden = hide::<3>(entry("ppl"), &points, 1);
+    let (search, mut draws) = (Knn::new(&points).unwrap(), Draws::new(2, Stage::Synthetic, 0));
+    let (mut offsets, mut neighbors, mut near) = (vec![0], Vec::new(), Vec::new());
+    for point in 0..points.len() {
+        search.nearest(point, 30, &mut near);
+        // One of eight entries is right.
+        neighbors.extend(near.iter().map(|&(_, near)| match draws.unit() < 0.125 {
+            true => near,
+            false => draws.below(points.len() as u64) as u32,
+        }));
+        offsets.push(neighbors.len() as u64);
+    }
+    let scores: Vec<f32> = neighbors.iter().map(|_| draws.unit() as f32).collect();
+    let named = oracle::from_points(&offsets, &neighbors, Some(&scores), &hidden.secret).unwrap();
+    let (offsets, records) = (named.offsets().to_vec(), named.records().to_vec());
+    let scores = named.scores().map(<[f32]>::to_vec);
+    let n_records = hidden.released.n_records();
+    let of_lines = Neighborhoods::try_new(offsets, records, scores, n_records, 2).unwrap();
+    let percent = |lists: &Neighborhoods| {
+        hidden.percent_within(&solve(&hidden.released, lists, joint()), 0.1)
+    };
+    let [points, lines] = [percent(&named), percent(&of_lines.with_about(named.about()))];
+    assert!(points > lines + 5.0, "{points} and {lines}");
+}
+
 /// Lists must state their map and row order, because positions depend on both.
 #[test]
 fn lists_say_what_they_are_about() {

@@ -11,7 +11,8 @@
 //!    in images without the density;
 //! 4. refines the best place, and keeps the best ones with weights proportional to `exp(score)`.
 //!
-//! The volume element is `range^2` for rays; for axis candidates, it is the density of the values published on the axis that was exchanged.
+//! The volume element is `range^2` for rays; for paired lines, it is the mean squared distance to the places of the other point of the line,
+//! because a line through a point is a ray from it; for axis candidates, it is the density of the values published on the exchanged axis.
 //! The first iteration moves all slots, the others one of two random halves in turn.
 //!
 //! It is belief propagation with particles on the graph of lists (Ihler et al. 2005). Figures are in docs/decisions/tried.md.
@@ -59,6 +60,8 @@ const PROPOSAL_NEAR2: [f32; 2] = [0.3, 1.0];
 /// Candidates are at least this far apart, in widths; kept places are farther apart than [`MERGED`] typical widths.
 const APART: f32 = 0.25;
 const MERGED: f32 = 0.3;
+/// Distance to the other point of a line while that has no place, in typical widths.
+const UNKNOWN_RANGE: f32 = 10.0;
 /// Places of rays are at least this many typical widths away from their center, where all rays meet.
 const LEAST_RANGE: f32 = 1.5;
 /// The pattern search starts with this step, in typical widths, and ends below the second one, or after some changes of the step.
@@ -69,7 +72,7 @@ const AGREED: f32 = 0.3;
 /// Places with less weight are dropped.
 const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Returns the estimates of all slots, one per record, after beliefs from `start`. Without enough slots, they stay.
+/// Returns the estimates of all slots, which lists name, after beliefs from `start`. Without enough slots, they stay.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,
@@ -446,8 +449,11 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         }
         let evidence = self.temper * (sum + ln(product));
         let own = self.problem.family.piece(slot, piece);
-        let typical2 = self.places.typical * self.places.typical;
-        let range2 = if own.from_center { distance2(&own.through, x) / typical2 } else { 1.0 };
+        let range2 = match own.from_center {
+            true => distance2(&own.through, x) / self.places.typical.powi(2),
+            false if self.problem.graph.slots_per_record == 2 => self.partner_range2(slot, x),
+            false => 1.0,
+        };
         // Keypoints lie all over an image: their density says nothing.
         let density = if D == 2 {
             0.0
@@ -461,6 +467,18 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             + density
             + 0.5 * (D - 1) as f32 * ln(range2.max(1e-6))
             + self.marginals.get(piece).map_or(0.0, |column| column[slot])
+    }
+
+    /// Returns the mean squared distance of a place to those of the other point of the line, in typical widths.
+    #[inline(always)]
+    fn partner_range2(&self, slot: usize, x: &[f32; D]) -> f32 {
+        let (mut sum, mut known) = (0.0, 0.0);
+        for place in &self.places.all[self.places.of(slot ^ 1)] {
+            sum += place.weight * distance2(&place.x, x);
+            known += place.weight;
+        }
+        let unknown = (1.0 - known).max(0.0) * UNKNOWN_RANGE * UNKNOWN_RANGE;
+        sum / self.places.typical.powi(2) + unknown
     }
 
     /// Moves a candidate along its piece while that improves its score, in steps that become shorter.

@@ -81,7 +81,7 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
 impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     #[inline(always)]
     fn odds(&self, slot: usize) -> Odds<'_, D> {
-        let is_paired = self.problem.graph.slots_per_record == 2;
+        let is_paired = self.problem.graph.slots_per_target == 2;
         let partner = is_paired.then(|| self.estimates[slot ^ 1]).filter(Estimate::is_known);
         let partner = partner.map(|partner| {
             (partner.position, self.distribution(self.density.at(&partner.position)))
@@ -286,7 +286,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             let sums = Sums::new(near, directions, &x, weights);
             let n: u32 = sums.n.iter().sum();
             if step_at == STEPS {
-                records = match problem.graph.slots_per_record {
+                records = match problem.graph.slots_per_target {
                     1 => n,
                     _ => near.n_pairs(&x, inverse_reach2),
                 };

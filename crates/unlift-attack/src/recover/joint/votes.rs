@@ -30,7 +30,7 @@ impl<const D: usize> Ends<D> {
     /// Gathers the estimates at the ends of the edges of `slot`; both estimates of a record where the edge does not specify the slot.
     #[inline(always)]
     pub(super) fn gather(&mut self, graph: &Graph, slot: usize, estimates: &[Estimate<D>]) {
-        let room = graph.slots_per_record * graph.of(slot).len();
+        let room = graph.slots_per_target * graph.of(slot).len();
         self.resize(room);
         let columns = self.x.0.each_mut().map(|column| &mut column[..room]);
         let (slots, classes) = (&mut self.slot[..room], &mut self.class[..room]);
@@ -44,7 +44,7 @@ impl<const D: usize> Ends<D> {
                 (slots[i], classes[i]) = (slot as u32, class);
             };
             set(n, end);
-            if graph.slots_per_record == 2 {
+            if graph.slots_per_target == 2 {
                 // Always written; the next row overwrites it if it is not kept.
                 set(n + 1, end | 1);
                 n += usize::from(graph.is_either(class));

@@ -1,4 +1,4 @@
-//! The neighborhood graph: which slots list which records, in both directions.
+//! The neighborhood graph: which slots list which records, or which slots where lists name these, in both directions.
 //!
 //! A slot has edges to the records that it lists, and to the slots that list its record. Edges fall in classes by direction (one end lists
 //! the other, or both do) and by score. Edges of one class share an inlier ratio, which recovery learns.
@@ -15,7 +15,7 @@ use crate::recover::map::places::evenly;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Side {
     Forward,
-    /// The neighbor lists the slot's record. Of a paired line, it may mean the other slot.
+    /// The neighbor lists the slot, or its record: of a paired line, that may mean the other slot.
     Reverse,
     Mutual,
 }
@@ -67,32 +67,33 @@ fn class_of(
     (side as usize * SCORE_CLASSES + lists.scores().map_or(0, class)) as u8
 }
 
+/// The slots that list each target: a record, or a slot if lists name slots.
 pub(crate) struct Listers {
     offsets: Vec<usize>,
     slots: Vec<u32>,
 }
 
 impl Listers {
-    fn new(lists: &Neighborhoods, n_records: usize) -> Self {
-        let mut offsets = vec![0; n_records + 1];
-        for record in lists.records() {
-            offsets[record.index() + 1] += 1;
+    fn new(lists: &Neighborhoods, n_targets: usize) -> Self {
+        let mut offsets = vec![0; n_targets + 1];
+        for target in (0..lists.n_slots()).flat_map(|slot| lists.targets(slot)) {
+            offsets[target + 1] += 1;
         }
-        for record in 0..n_records {
-            offsets[record + 1] += offsets[record];
+        for target in 0..n_targets {
+            offsets[target + 1] += offsets[target];
         }
         let (mut next, mut slots) = (offsets.clone(), vec![0; lists.records().len()]);
         for slot in 0..lists.n_slots() {
-            for record in lists.of(slot) {
-                slots[next[record.index()]] = slot as u32;
-                next[record.index()] += 1;
+            for target in lists.targets(slot) {
+                slots[next[target]] = slot as u32;
+                next[target] += 1;
             }
         }
         Self { offsets, slots }
     }
 
-    pub(crate) fn of(&self, record: usize) -> &[u32] {
-        &self.slots[self.offsets[record]..self.offsets[record + 1]]
+    pub(crate) fn of(&self, target: usize) -> &[u32] {
+        &self.slots[self.offsets[target]..self.offsets[target + 1]]
     }
 }
 
@@ -103,44 +104,48 @@ pub(crate) struct Graph {
     ends: Vec<u32>,
     class: Vec<u8>,
     pub(crate) slots_per_record: usize,
+    /// 1 if lists name slots, else as many as a record has.
+    pub(crate) slots_per_target: usize,
     pub(crate) listers: Listers,
 }
 
 impl Graph {
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
-        let listers = Listers::new(lists, n_slots / slots_per_record);
+        let slots_per_target = lists.slots_per_target(slots_per_record);
+        let listers = Listers::new(lists, n_slots / slots_per_target);
         let bounds = &score_bounds(lists);
         let most = MOST_REVERSE * lists.mean_length().ceil() as usize;
         let edges = |slot: usize| {
             let mut edges: Vec<(u32, u8)> = Vec::new();
-            let list = lists.of(slot);
+            let target = |at: usize| lists.target(slot, at);
+            let n_listed = lists.of(slot).len();
             let own = |side: Side, at: usize| {
-                let end = list[at].0 * slots_per_record as u32;
+                let end = (target(at) * slots_per_target) as u32;
                 (end, class_of(lists, bounds, side, slot, || at))
             };
-            let record = record_of(slot, slots_per_record);
-            let all = listers.of(record);
-            let (mut at, mut mutual) = (0, u32::MAX);
+            let as_target = record_of(slot, slots_per_target);
+            let all = listers.of(as_target);
+            let (mut at, mut mutual) = (0, usize::MAX);
             // Slots are usually in random order, so evenly spaced ones are a fair sample.
             for &by in all.iter().step_by(all.len().div_ceil(most).max(1)) {
-                let theirs = record_of(by as usize, slots_per_record) as u32;
-                while at < list.len() && list[at].0 < theirs {
+                let theirs = record_of(by as usize, slots_per_target);
+                while at < n_listed && target(at) < theirs {
                     edges.push(own(Side::Forward, at));
                     at += 1;
                 }
-                if at < list.len() && list[at].0 == theirs {
+                if at < n_listed && target(at) == theirs {
                     edges.push(own(Side::Mutual, at));
                     at += 1;
                     mutual = theirs;
                 } else if mutual != theirs {
-                    // If a record is mutual already, its other slot adds nothing.
+                    // If a target is mutual already, its other slot adds nothing.
                     let by = by as usize;
-                    let entry = || lists.of(by).partition_point(|r| r.index() < record);
+                    let entry = || lists.targets(by).take_while(|&to| to < as_target).count();
                     edges.push((by as u32, class_of(lists, bounds, Side::Reverse, by, entry)));
                 }
             }
-            edges.extend((at..list.len()).map(|at| own(Side::Forward, at)));
+            edges.extend((at..n_listed).map(|at| own(Side::Forward, at)));
             edges
         };
         let rows: Vec<Vec<(u32, u8)>> = (0..n_slots).into_par_iter().map(edges).collect();
@@ -150,7 +155,7 @@ impl Graph {
             Some(*end)
         }));
         let (ends, class) = rows.into_iter().flatten().unzip();
-        Self { offsets, ends, class, slots_per_record, listers }
+        Self { offsets, ends, class, slots_per_record, slots_per_target, listers }
     }
 
     /// Returns the end and the class of each edge of `slot`.
@@ -161,10 +166,10 @@ impl Graph {
         edges.map(|(&end, &class)| (end as usize, class))
     }
 
-    /// Whether an edge of this class leads to a record without saying which of its two slots: entries of lists are records.
+    /// Whether an edge of this class leads to a record without saying which of its two slots.
     #[inline(always)]
     pub(crate) fn is_either(&self, class: u8) -> bool {
-        self.slots_per_record == 2 && side(class) != Side::Reverse
+        self.slots_per_target == 2 && side(class) != Side::Reverse
     }
 
     /// Returns the slot at the end of an edge, or both slots of the record where the edge does not specify one.
@@ -173,8 +178,8 @@ impl Graph {
         end..end + 1 + usize::from(self.is_either(class))
     }
 
-    pub(crate) fn slots_of(&self, record: usize) -> Range<usize> {
-        record * self.slots_per_record..(record + 1) * self.slots_per_record
+    pub(crate) fn slots_of(&self, target: usize) -> Range<usize> {
+        target * self.slots_per_target..(target + 1) * self.slots_per_target
     }
 
     /// Returns the end and the class of the edge with index `at` among all edges.
@@ -199,10 +204,24 @@ impl Graph {
         counts
     }
 
-    /// Returns the edges as neighborhoods, for records with one slot.
-    pub(crate) fn neighborhoods(&self) -> Neighborhoods {
-        let records = self.ends.iter().map(|&end| RecordId(end)).collect();
-        Neighborhoods::unchecked(self.offsets.clone(), records)
+    /// Returns the edges as lists of records; `None` if an edge may mean either slot of a record.
+    pub(crate) fn neighborhoods(&self) -> Option<Neighborhoods> {
+        if self.slots_per_target > 1 {
+            return None;
+        }
+        let (mut offsets, mut records) = (vec![0], Vec::with_capacity(self.len()));
+        for slot in 0..self.n_slots() {
+            let record = |(end, _)| RecordId::from_index(record_of(end, self.slots_per_record));
+            let start = records.len();
+            for record in self.of(slot).map(record) {
+                // Two slots of a record follow each other.
+                if records[start..].last() != Some(&record) {
+                    records.push(record);
+                }
+            }
+            offsets.push(records.len() as u64);
+        }
+        Some(Neighborhoods::unchecked(offsets, records))
     }
 }
 
@@ -256,6 +275,26 @@ mod tests {
         edges.extend(only.map(|&(by, at)| (by, class(Side::Reverse, by, at))));
         edges.sort_unstable_by_key(|edge| edge.0);
         edges
+    }
+
+    /// Lists that name slots have the edges of lists of as many records with one slot each.
+    #[test]
+    fn edges_lead_to_the_slots_that_lists_name() {
+        let lists = lists(2_000, 2);
+        let mut draws = Draws::new(6, Stage::NullSample, 0);
+        let slots = lists.records().iter().map(|record| 2 * record.0 + draws.below(2) as u32);
+        let slots: Vec<u32> = slots.collect();
+        let records = slots.iter().map(|&slot| RecordId(slot)).collect();
+        let (offsets, scores) = (lists.offsets().to_vec(), lists.scores().map(<[f32]>::to_vec));
+        let apart = Neighborhoods::try_new(offsets, records, scores, 4_000, 1).unwrap();
+        let error = lists.clone().naming(vec![0; slots.len()], 2).unwrap_err().to_string();
+        assert!(error.contains("expected a slot of record"), "{error}");
+        let [named, apart] =
+            [Graph::new(&lists.naming(slots, 2).unwrap(), 2), Graph::new(&apart, 1)];
+        for slot in 0..4_000 {
+            assert_eq!(named.of(slot).collect::<Vec<_>>(), apart.of(slot).collect::<Vec<_>>());
+        }
+        assert!(named.neighborhoods().unwrap().records().iter().all(|record| record.0 < 2_000));
     }
 
     #[test]

@@ -97,8 +97,13 @@ pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Ne
     }
     let scores = records.iter().map(|_| draws.normal() as f32).collect();
     let scores = seed.is_multiple_of(2).then_some(scores);
+    let slots = records.iter().map(|record| 2 * record.0 + draws.below(2) as u32).collect();
     let lists = Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record);
-    lists.unwrap().with_about(about(seed))
+    let lists = lists.unwrap().with_about(about(seed));
+    match slots_per_record == 2 && seed.is_multiple_of(3) {
+        true => lists.naming(slots, 2).unwrap(),
+        false => lists,
+    }
 }
 
 fn about(seed: u64) -> About {
