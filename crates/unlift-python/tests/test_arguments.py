@@ -40,8 +40,8 @@ def test_records_are_those_of_the_array_in_every_kind_of_number(points, dtype):
 
 
 def test_lists_of_paired_lines_may_name_slots(points, tmp_path):
-    paired = unlift.obfuscate(unlift.Map(points[:40], scale=1.0), "ppl", seed=1)
-    slots = (np.arange(40)[:, None] // 2 * 2 + [2, 5, -38]) % 40
+    paired = unlift.obfuscate(unlift.Map(points[:60], scale=1.0), "ppl", seed=1)
+    slots = (np.arange(60)[:, None] // 2 * 2 + [2, 5, 8]) % 60
     slots[0, 2] = -1
     lists = unlift.Neighborhoods(paired, np.where(slots < 0, -1, slots // 2), slots=slots)
     np.testing.assert_array_equal(lists.slots // 2, lists.records)
