@@ -3,7 +3,8 @@
 //! look like protection, so each doubt is shown beside the verdict, and no gate holds with one.
 
 use unlift::audit::doubts::{
-    NeighborDistances, across, in_unit, least, noise, of_release, short, unused, with_sign,
+    NeighborDistances, across, exchanged, in_unit, least, noise, of_release, short, unused,
+    with_sign,
 };
 use unlift::audit::{Plan, Row, Threshold};
 use unlift::evaluate::Truth;
@@ -84,7 +85,7 @@ pub(crate) fn doubts(
                 row.scheme
             )
         });
-        let of_row = of_delta.or_else(|| unused(row));
+        let of_row = of_delta.or_else(|| unused(row)).or_else(|| exchanged(row));
         // One line per scheme is enough.
         if of_row.is_some() && !told.contains(&&row.scheme) {
             told.push(&row.scheme);
@@ -120,7 +121,7 @@ const ACROSS_M: [f64; 2] = [1e-6, 1e9];
 /// If nearest neighbors are this many times the largest threshold apart, no attack can come near
 /// ([`HOPELESS`]), or the lengths are doubtful ([`UNUSUAL`]).
 pub(crate) const HOPELESS: f64 = 100.0;
-const UNUSUAL: f64 = 10.0;
+const UNUSUAL: f64 = 3.0;
 
 /// Checks a scale against the points as they were read.
 ///

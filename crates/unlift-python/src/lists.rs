@@ -38,13 +38,9 @@ impl Neighborhoods {
     ) -> PyResult<Self> {
         let needs = needs_of(needs)?;
         let lists = of_either!(&released_of(released)?.0, released => {
-            let lists = lists_of(released, records, scores, usize::MAX, needs);
-            let Some(slots) = slots else { return Ok(Self(Arc::new(lists?))) };
-            let (slots, _) = whole("slots", slots, &[2], -1..=released.n_slots() as i64 - 1)?;
-            let slots = slots.into_iter().filter(|&slot| slot >= 0).map(|slot| slot as u32);
-            lists?.naming(slots.collect(), released.slots_per_record())
+            lists_of(released, records, (scores, slots), usize::MAX, needs)
         });
-        Ok(Self(Arc::new(lists.map_err(raised)?)))
+        Ok(Self(Arc::new(lists?)))
     }
 
     /// Reads lists of `released` (`.npz`).
@@ -109,7 +105,7 @@ pub fn needs_of(name: &str) -> PyResult<Needs> {
 fn lists_of<const D: usize>(
     released: &released::Released<D>,
     records: &Bound<'_, PyAny>,
-    scores: Option<&Bound<'_, PyAny>>,
+    (scores, slots): (Option<&Bound<'_, PyAny>>, Option<&Bound<'_, PyAny>>),
     k: usize,
     needs: Needs,
 ) -> PyResult<neighbors::Neighborhoods> {
@@ -126,6 +122,17 @@ fn lists_of<const D: usize>(
         }
         scores => scores.map(|(values, _)| values),
     };
+    let slots = match slots {
+        Some(slots) => {
+            let (slots, own) = whole("slots", slots, &[2], -1..=n_slots as i64 - 1)?;
+            if own != shape {
+                let expected = format!("the shape of the records, {}", shape_text(&shape));
+                return Err(wrong("slots", expected, shape_text(&own)));
+            }
+            Some(slots)
+        }
+        None => None,
+    };
     let columns = shape[1];
     let (mut offsets, mut kept) = (vec![0], Vec::new());
     for slot in 0..n_slots {
@@ -140,6 +147,12 @@ fn lists_of<const D: usize>(
     let order = match needs {
         Needs::Nothing => RowOrder::Either,
         _ => RowOrder::DescriptorRows,
+    };
+    let lists = match slots {
+        Some(slots) => {
+            lists.and_then(|l| l.with_slots(kept.iter().map(|&at| slots[at] as u32).collect()))
+        }
+        None => lists,
     };
     let map = Some(released.fingerprint());
     Ok(lists.map_err(raised)?.with_about(About { map, order, ..About::default() }))
@@ -157,9 +170,9 @@ pub fn returned<const D: usize>(
     }
     if let Ok(both) = given.cast::<PyTuple>() {
         let (records, scores): (Bound<'_, PyAny>, Bound<'_, PyAny>) = both.extract()?;
-        return lists_of(released, &records, Some(&scores), k, needs);
+        return lists_of(released, &records, (Some(&scores), None), k, needs);
     }
-    lists_of(released, given, None, k, needs)
+    lists_of(released, given, (None, None), k, needs)
 }
 
 /// Id of the process that has used networks, or 0. Forked children lack the threads of the networks.

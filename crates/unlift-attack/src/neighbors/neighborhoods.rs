@@ -12,7 +12,7 @@ pub struct Neighborhoods {
     offsets: Vec<u64>,
     records: Vec<RecordId>,
     scores: Option<Vec<f32>>,
-    /// Per entry, the slot that it names: one of those of its record.
+    /// Per entry, the slot that it means: one of the two of its record.
     slots: Option<Vec<u32>>,
     about: About,
 }
@@ -68,24 +68,48 @@ impl Neighborhoods {
         Ok(Self { offsets, records, scores, slots: None, about: About::default() })
     }
 
-    /// Creates lists of a released map from the (score, record) of each slot, in any order.
+    /// Creates lists of a released map from the (score, slot) of the neighbors of each slot, in any order.
     ///
     /// # Errors
-    /// When a record is out of range, twice in a list or the slot's own, or a score is not finite.
+    /// When a slot is out of range, two are of one record or one is of the own record, or a score is not finite.
     pub(super) fn scored<const D: usize>(
-        rows: impl IntoIterator<Item = Vec<(f32, RecordId)>>,
+        rows: impl IntoIterator<Item = Vec<(f32, u32)>>,
         released: &Released<D>,
         order: RowOrder,
     ) -> Result<Self, Error> {
-        let (mut offsets, mut records, mut scores) = (vec![0u64], Vec::new(), Vec::new());
+        let (n_records, per_record) = (released.n_records(), released.slots_per_record());
+        let (mut offsets, mut slots, mut scores) = (vec![0u64], Vec::new(), Vec::new());
         for row in rows {
             scores.extend(row.iter().map(|&(score, _)| score));
-            records.extend(row.iter().map(|&(_, record)| record));
-            offsets.push(records.len() as u64);
+            slots.extend(row.iter().map(|&(_, slot)| slot));
+            offsets.push(slots.len() as u64);
         }
-        let (n_records, slots) = (released.n_records(), released.slots_per_record());
-        let lists = Self::try_new(offsets, records, Some(scores), n_records, slots)?;
-        Ok(lists.with_about(About { map: Some(released.fingerprint()), order, ..About::default() }))
+        let records = slots.iter().map(|&slot| RecordId(slot / per_record as u32)).collect();
+        let lists = Self::try_new(offsets, records, Some(scores), n_records, per_record)?;
+        let about = About { map: Some(released.fingerprint()), order, ..About::default() };
+        // Of the records alone, it is not known which of two points is meant.
+        let names_slots = per_record == 2 && order == RowOrder::DescriptorRows;
+        Ok(if names_slots { lists.with_slots(slots)? } else { lists }.with_about(about))
+    }
+
+    /// Sets which of the two slots of its record each entry means. Without them, an entry means either. `slots` has those of one list after
+    /// the other, within a list in any order. They are numbered as the lists are.
+    ///
+    /// # Errors
+    /// When the slots of a list are not one of each of its records.
+    pub fn with_slots(mut self, mut slots: Vec<u32>) -> Result<Self, Error> {
+        Error::check_len("slots of neighborhoods", slots.len(), self.records.len(), " entries")?;
+        for slot in 0..self.n_slots() {
+            let named = &mut slots[self.range(slot)];
+            named.sort_unstable();
+            let is_other = |(named, record): &(&u32, &RecordId)| *named / 2 != record.0;
+            if let Some((named, record)) = named.iter().zip(self.of(slot)).find(is_other) {
+                let what = format!("neighborhood of slot {slot}");
+                return Err(Error::new(what, format!("a slot of record {}", record.0), named));
+            }
+        }
+        self.slots = Some(slots);
+        Ok(self)
     }
 
     /// Creates empty lists for `n_slots` slots.
@@ -102,29 +126,6 @@ impl Neighborhoods {
     #[must_use]
     pub fn with_about(self, about: About) -> Self {
         Self { about, ..self }
-    }
-
-    /// Adds which of the `slots_per_record` points of its record each entry means, which lists from descriptors of points tell. `slots` has
-    /// the slots of one list after the other, those of a list in any order.
-    ///
-    /// # Errors
-    /// When a list has other slots than one of each of its records.
-    pub fn naming(mut self, mut slots: Vec<u32>, slots_per_record: usize) -> Result<Self, Error> {
-        Error::check_len("slots of neighborhoods", slots.len(), self.records.len(), " entries")?;
-        for slot in 0..self.n_slots() {
-            let named = &mut slots[self.range(slot)];
-            named.sort_unstable();
-            let pairs = named.iter().zip(self.of(slot));
-            let is_other = |&(&named, record): &(&u32, &RecordId)| {
-                named as usize / slots_per_record != record.index()
-            };
-            if let Some((named, record)) = { pairs }.find(is_other) {
-                let what = format!("neighborhood of slot {slot}");
-                return Err(Error::new(what, format!("a slot of record {}", record.0), named));
-            }
-        }
-        self.slots = Some(slots);
-        Ok(self)
     }
 
     /// The released map and the row order of the lists.
@@ -154,14 +155,14 @@ impl Neighborhoods {
         self.scores.as_ref().map(|scores| &scores[self.range(slot)])
     }
 
-    /// What an entry names: a slot if lists name slots, else a record.
+    /// Returns what an entry means: a slot where lists have slots, else a record.
     #[inline(always)]
     pub(crate) fn target(&self, slot: usize, at: usize) -> usize {
         let at = self.offsets[slot] as usize + at;
         self.slots.as_ref().map_or_else(|| self.records[at].index(), |slots| slots[at] as usize)
     }
 
-    /// What the entries of `slot` name, ascending.
+    /// Returns what the entries of `slot` mean, ascending.
     #[inline(always)]
     pub(crate) fn targets(&self, slot: usize) -> impl ExactSizeIterator<Item = usize> {
         (0..self.range(slot).len()).map(move |at| self.target(slot, at))
@@ -182,7 +183,7 @@ impl Neighborhoods {
         &self.offsets
     }
 
-    /// The slots of the records that are meant, if the source tells them.
+    /// The slot that each entry means, if the source says which of the two slots of a record that is.
     pub fn slots(&self) -> Option<&[u32]> {
         self.slots.as_deref()
     }

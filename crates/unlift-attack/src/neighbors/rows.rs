@@ -8,7 +8,7 @@ use super::Neighborhoods;
 use super::kind::comparable;
 use crate::descriptors::Values;
 use crate::released::Released;
-use crate::{Descriptors, Error, RecordId, RowOrder};
+use crate::{Descriptors, Error, RowOrder};
 
 /// Partners of a row, best first.
 pub(super) type Ranked = Vec<(f32, u32)>;
@@ -114,23 +114,17 @@ impl<'a> Rows<'a> {
         for (ranked, &slot) in ranked.iter().zip(&self.slots) {
             ranked_of[slot as usize] = ranked;
         }
-        let mut named = Vec::new();
+        let record = |slot: u32| slot / self.slots_per_record as u32;
         let list = |ranked: &[(f32, u32)]| {
-            let mut list: Vec<(f32, RecordId)> = Vec::with_capacity(k);
+            let mut list: Vec<(f32, u32)> = Vec::with_capacity(k);
             for &(score, partner) in ranked {
-                let record = RecordId(self.records[partner as usize]);
-                if list.len() < k && list.iter().all(|&(_, listed)| listed != record) {
-                    list.push((score, record));
-                    named.push(self.slots[partner as usize]);
+                let slot = self.slots[partner as usize];
+                if list.len() < k && list.iter().all(|&(_, other)| record(other) != record(slot)) {
+                    list.push((score, slot));
                 }
             }
             list
         };
-        let rows = ranked_of.into_iter().map(list);
-        let lists = Neighborhoods::scored(rows, released, RowOrder::DescriptorRows)?;
-        match self.slots_per_record {
-            1 => Ok(lists),
-            several => lists.naming(named, several),
-        }
+        Neighborhoods::scored(ranked_of.into_iter().map(list), released, RowOrder::DescriptorRows)
     }
 }

@@ -137,6 +137,9 @@ pub(super) fn check<const D: usize>(
         let expected = format!("records below {n_records}");
         return Err(Error::new("neighborhoods", expected, record.0));
     }
+    if lists.slots().is_some() && released.slots_per_record() != 2 {
+        return Err(Error::new("neighborhoods", "no slots, as a record has one", "slots"));
+    }
     options.check()
 }
 

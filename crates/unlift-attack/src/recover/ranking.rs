@@ -181,7 +181,7 @@ fn exponential(y: f32) -> f32 {
 /// The estimates near a place, which are the terms of the log-likelihood of a slot there, with buffers.
 #[derive(Default)]
 struct Terms<const D: usize> {
-    /// The records that the slot lists, and the slots that list its record.
+    /// The targets that the slot lists, and the slots that list it, or its record.
     listed: Marks,
     lists: Marks,
     /// Radius at the center, and the number of estimates within it.

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use unlift::audit::doubts::Checked;
+use unlift::audit::doubts::{Checked, exchanged};
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::blind;
@@ -539,7 +539,10 @@ fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<E
     let (row, _) = measure(&recovered, &original, &secret, baseline.as_ref(), &thresholds)
         .map_err(|error| FileError::core(&args.recovered, error))?;
     let slots_per_record = secret.slots_per_record();
-    Ok(Evaluated { row, about, slots_per_record, doubts: checked.notes(&thresholds, unit) })
+    let doubts = checked
+        .notes(&thresholds, unit)
+        .map(|notes| notes.into_iter().chain(exchanged(&row)).collect());
+    Ok(Evaluated { row, about, slots_per_record, doubts })
 }
 
 fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<Evaluated> {

@@ -46,7 +46,9 @@ impl Kind {
         match self {
             Self::Released => ("released", "a released map", RELEASED),
             Self::Truth => ("truth", "a truth file", TRUTH),
-            Self::Neighborhoods => ("neighborhoods", "neighborhoods of slots", "records slots scores"),
+            Self::Neighborhoods => {
+                ("neighborhoods", "neighborhoods of slots", "records slots scores")
+            }
             Self::PointNeighborhoods => {
                 ("point_neighborhoods", "neighborhoods of points", "neighbors scores")
             }

@@ -62,14 +62,7 @@ pub(super) fn neighborhoods_of(
 ) -> Result<Neighborhoods, Error> {
     arrays.expect(Kind::Neighborhoods)?;
     let about = arrays.meta.about()?;
-    let mut lists = lists_of(arrays, "records", n_records, slots_per_record)?;
-    let n_slots = n_records * slots_per_record;
-    let named = |name: &str| Ok(arrays.integers(name, [Some(n_slots), None], n_slots, true)?.0);
-    if let Some(mut slots) = arrays.optional("slots", named)? {
-        slots.retain(|&slot| slot != NONE);
-        let named = lists.naming(slots, slots_per_record);
-        lists = named.map_err(|source| arrays.refused(source))?;
-    }
+    let lists = lists_of(arrays, "records", n_records, slots_per_record)?;
     Ok(lists.with_about(about))
 }
 
@@ -101,12 +94,21 @@ fn lists_of(
         let kept = given.into_iter().zip(&ids).filter(|(_, id)| is_record(id));
         Ok(kept.map(|(score, _)| score).collect())
     })?;
+    let slots = arrays.optional("slots", |name| {
+        let (given, _) = arrays.integers(name, [Some(n_rows), Some(k)], n_rows, true)?;
+        let kept = given.into_iter().zip(&ids).filter(|(_, id)| is_record(id));
+        Ok(kept.map(|(slot, _)| slot).collect())
+    })?;
     let mut offsets = vec![0];
     for row in 0..n_rows {
         let n = ids[row * k..(row + 1) * k].iter().filter(|id| is_record(id)).count();
         offsets.push(offsets[row] + n as u64);
     }
     let records = ids.into_iter().filter(is_record).map(RecordId).collect();
-    Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record)
-        .map_err(|source| arrays.refused(source))
+    let lists = Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record);
+    let lists = match slots {
+        Some(slots) => lists.and_then(|lists| lists.with_slots(slots)),
+        None => lists,
+    };
+    lists.map_err(|source| arrays.refused(source))
 }

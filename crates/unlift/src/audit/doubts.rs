@@ -5,6 +5,7 @@ use std::borrow::Borrow;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::row::EXCHANGED;
 use super::{Row, Threshold};
 use crate::evaluate::{OFF_RECORD, Truth, are_strangers, nearer_to_own, recovered_away};
 use crate::geometry::knn::Knn;
@@ -361,6 +362,16 @@ pub fn noise(row: &Row, threshold: f64) -> Option<String> {
          others may average the noise away"
     );
     (!threshold.is_finite() || off > NOISE * threshold).then_some(doubt)
+}
+
+/// Returns a doubt if many points of `row` were recovered at the other point of their line.
+pub fn exchanged(row: &Row) -> Option<String> {
+    let percent = row.metrics.get(EXCHANGED)?;
+    Some(format!(
+        "{}: {percent:.0} % of the points come back at the other point of their line: is the truth's descriptor_row right, and do the \
+         two descriptors differ?",
+        row.scheme
+    ))
 }
 
 /// Returns a doubt if the attack of `row` could not use most of the records, as if all lines are parallel.

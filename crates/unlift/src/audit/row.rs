@@ -9,7 +9,7 @@ use super::share::{
     ByThreshold, Interval, Share, Shares, Threshold, WithInterval, intervals, over_repeats,
     percents, shares,
 };
-use crate::evaluate::{Accuracy, Bin, Reliability, evaluate, reliability};
+use crate::evaluate::{Accuracy, Bin, Reliability, evaluate, exchanged_percent, reliability};
 use crate::recover::Recovered;
 use crate::truth::{DropReason, Original, Secret};
 use crate::{Error, Unit};
@@ -411,6 +411,9 @@ impl Row {
     }
 }
 
+/// The metric [`exchanged_percent`] of a row, which is absent where it is small.
+pub const EXCHANGED: &str = "exchanged_percent";
+
 /// Computes the row of `recovered` and its errors, without the fields that name the cell.
 ///
 /// `secret` is that which the obfuscation returned. Without `blind`, there are no blind figures.
@@ -447,6 +450,8 @@ pub fn measure<const D: usize>(
     row.fill_errors(|p| accuracy.percentile(p));
     let smallest = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     row.parts.reliability = reliability(recovered, &accuracy, smallest);
+    let exchanged = exchanged_percent(recovered, original, secret, smallest);
+    row.metrics.extend(exchanged.map(|percent| (EXCHANGED.to_owned(), percent)));
     row.summarize();
     Ok((row, accuracy))
 }

@@ -65,6 +65,26 @@ pub fn evaluate<const D: usize>(
     Ok(Accuracy { lost, n_exact, assignment_percent, ..Accuracy::of(errors) })
 }
 
+/// Returns the percentage of points that are recovered within `threshold` at the other point of their line, if it is so large that the
+/// stated descriptor rows are doubtful; `None` for lists that are not in the order of descriptor rows.
+pub fn exchanged_percent<const D: usize>(
+    recovered: &Recovered<D>,
+    original: &Original<D>,
+    secret: &Secret,
+    threshold: f64,
+) -> Option<f64> {
+    if secret.slots_per_record() < 2 || recovered.about().order != RowOrder::DescriptorRows {
+        return None;
+    }
+    let by_row = secret.by_descriptor_row();
+    let [own, other] = [&by_row, &by_row.exchanged(|_| true)]
+        .map(|secret| compare(recovered, original, secret).percent_within(threshold));
+    (other > MOST_EXCHANGED.0 + MOST_EXCHANGED.1 * own).then_some(other)
+}
+
+/// Usual percentage of points recovered at the other point of their line: a constant, and a share of those recovered at their own.
+const MOST_EXCHANGED: (f64, f64) = (5.0, 0.25);
+
 /// Compares every row with the original in its slot of `secret`.
 fn compare<const D: usize>(
     recovered: &Recovered<D>,

@@ -2,6 +2,8 @@
 //!
 //! It simulates an attacker of known quality. No other source reads ground truth.
 
+use std::cmp::Ordering;
+
 use rayon::prelude::*;
 
 use super::Neighborhoods;
@@ -245,7 +247,11 @@ pub fn from_points(
     for (slot, original) in secret.hidden().iter().enumerate() {
         let own = RecordId::from_index(slot / slots_per_record);
         let start = records.len();
-        for at in offsets[original.index()] as usize..offsets[original.index() + 1] as usize {
+        let row = offsets[original.index()] as usize..offsets[original.index() + 1] as usize;
+        let mut row: Vec<usize> = row.collect();
+        // Of the two points of a line, the one with the better score is listed.
+        row.sort_by(|&a, &b| scores.map_or(Ordering::Equal, |s| s[b].total_cmp(&s[a])));
+        for at in row {
             let Some(near) = slot_of[neighbors[at] as usize] else { continue };
             let record = RecordId::from_index(near / slots_per_record);
             if record != own && !records[start..].contains(&record) {
@@ -257,11 +263,8 @@ pub fn from_points(
         rows.push(records.len() as u64);
     }
     let n_records = secret.n_slots() / slots_per_record;
-    let mut lists =
-        Neighborhoods::try_new(rows, records, kept_scores, n_records, slots_per_record)?;
-    if slots_per_record > 1 {
-        lists = lists.naming(named, slots_per_record)?;
-    }
+    let lists = Neighborhoods::try_new(rows, records, kept_scores, n_records, slots_per_record)?;
+    let lists = if slots_per_record == 2 { lists.with_slots(named)? } else { lists };
     Ok(lists.with_about(About { map: secret.map(), order: RowOrder::Slots, ..About::default() }))
 }
 

@@ -72,7 +72,7 @@ const AGREED: f32 = 0.3;
 /// Places with less weight are dropped.
 const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Returns the estimates of all slots, which lists name, after beliefs from `start`. Without enough slots, they stay.
+/// Returns the estimates of all slots after beliefs from `start`; every edge leads to one slot. Without enough slots, they stay.
 pub(super) fn recover<const D: usize, F: Family<D>>(
     problem: &Problem<'_, D, F>,
     start: Vec<Estimate<D>>,

@@ -1,6 +1,6 @@
-//! The neighborhood graph: which slots list which records, or which slots where lists name these, in both directions.
+//! The neighborhood graph: which slots list which targets, in both directions. A target is a slot where lists have slots, else a record.
 //!
-//! A slot has edges to the records that it lists, and to the slots that list its record. Edges fall in classes by direction (one end lists
+//! A slot has edges to the targets that it lists, and to the slots that list it, or its record. Edges fall in classes by direction (one end lists
 //! the other, or both do) and by score. Edges of one class share an inlier ratio, which recovery learns.
 
 use std::ops::Range;
@@ -67,7 +67,7 @@ fn class_of(
     (side as usize * SCORE_CLASSES + lists.scores().map_or(0, class)) as u8
 }
 
-/// The slots that list each target: a record, or a slot if lists name slots.
+/// The slots that list each target.
 pub(crate) struct Listers {
     offsets: Vec<usize>,
     slots: Vec<u32>,
@@ -104,7 +104,7 @@ pub(crate) struct Graph {
     ends: Vec<u32>,
     class: Vec<u8>,
     pub(crate) slots_per_record: usize,
-    /// 1 if lists name slots, else as many as a record has.
+    /// 1 where lists have slots, else as many as a record has.
     pub(crate) slots_per_target: usize,
     pub(crate) listers: Listers,
 }
@@ -124,6 +124,7 @@ impl Graph {
                 let end = (target(at) * slots_per_target) as u32;
                 (end, class_of(lists, bounds, side, slot, || at))
             };
+            let record = record_of(slot, slots_per_record);
             let as_target = record_of(slot, slots_per_target);
             let all = listers.of(as_target);
             let (mut at, mut mutual) = (0, usize::MAX);
@@ -141,7 +142,7 @@ impl Graph {
                 } else if mutual != theirs {
                     // If a target is mutual already, its other slot adds nothing.
                     let by = by as usize;
-                    let entry = || lists.targets(by).take_while(|&to| to < as_target).count();
+                    let entry = || lists.of(by).partition_point(|r| r.index() < record);
                     edges.push((by as u32, class_of(lists, bounds, Side::Reverse, by, entry)));
                 }
             }
@@ -197,9 +198,9 @@ impl Graph {
     }
 
     pub(crate) fn times_listed(&self) -> Vec<u32> {
-        let mut counts = vec![0; self.n_slots() / self.slots_per_record];
+        let mut counts = vec![0; self.n_slots() / self.slots_per_target];
         for &end in &self.ends {
-            counts[record_of(end as usize, self.slots_per_record)] += 1;
+            counts[record_of(end as usize, self.slots_per_target)] += 1;
         }
         counts
     }
@@ -287,10 +288,10 @@ mod tests {
         let records = slots.iter().map(|&slot| RecordId(slot)).collect();
         let (offsets, scores) = (lists.offsets().to_vec(), lists.scores().map(<[f32]>::to_vec));
         let apart = Neighborhoods::try_new(offsets, records, scores, 4_000, 1).unwrap();
-        let error = lists.clone().naming(vec![0; slots.len()], 2).unwrap_err().to_string();
+        let error = lists.clone().with_slots(vec![0; slots.len()]).unwrap_err().to_string();
         assert!(error.contains("expected a slot of record"), "{error}");
         let [named, apart] =
-            [Graph::new(&lists.naming(slots, 2).unwrap(), 2), Graph::new(&apart, 1)];
+            [Graph::new(&lists.with_slots(slots).unwrap(), 2), Graph::new(&apart, 1)];
         for slot in 0..4_000 {
             assert_eq!(named.of(slot).collect::<Vec<_>>(), apart.of(slot).collect::<Vec<_>>());
         }

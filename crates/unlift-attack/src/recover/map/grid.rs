@@ -188,7 +188,7 @@ const WIDER: usize = 3;
 const LARGEST_STRETCH: f32 = 2.5;
 
 impl<const D: usize> Density<D> {
-    /// Computes the density of `estimates`, smoothed over about `radius`; `listed` is the number of edges to each record.
+    /// Computes the density of `estimates`, smoothed over about `radius`; `listed` is the number of edges to each target.
     pub(crate) fn new(estimates: &[Estimate<D>], listed: &[u32], radius: f32) -> Self {
         let n = estimates.len();
         let places = sample(estimates);
@@ -198,10 +198,10 @@ impl<const D: usize> Density<D> {
         let fits = (0..D).map(side).product::<f64>() <= most as f64;
         let mut grid =
             if fits { Grid::of_cells(low, high, cell) } else { Grid::over(low, high, most) };
-        let slots_per_record = n / listed.len().max(1);
+        let slots_per_target = n / listed.len().max(1);
         let mut weight = 0.0f64;
         for (slot, estimate) in estimates.iter().enumerate() {
-            let times = listed[record_of(slot, slots_per_record)] as f32;
+            let times = listed[record_of(slot, slots_per_target)] as f32;
             weight += f64::from(times);
             if estimate.is_known() {
                 grid.spread(&estimate.position, times);

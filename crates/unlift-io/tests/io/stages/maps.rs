@@ -101,7 +101,7 @@ pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Ne
     let lists = Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record);
     let lists = lists.unwrap().with_about(about(seed));
     match slots_per_record == 2 && seed.is_multiple_of(3) {
-        true => lists.naming(slots, 2).unwrap(),
+        true => lists.with_slots(slots).unwrap(),
         false => lists,
     }
 }
