@@ -1,5 +1,6 @@
 //! Properties of all sources that compare descriptors, and of each source's purpose.
 
+use unlift::evaluate::exchanged_percent;
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Overlap, Similarity, Source};
 
@@ -214,6 +215,20 @@ fn lists_that_name_points_recover_more_than_lists_of_lines() {
     };
     let [points, lines] = [percent(&named), percent(&of_lines.with_about(named.about()))];
     assert!(points > lines + 5.0, "{points} and {lines}");
+}
+
+/// If descriptor rows of the truth are wrong, points come back at the other point of their line.
+#[test]
+fn wrong_descriptor_rows_are_told() {
+    let scheme = entry("ppl").of_dimension::<3>(&SchemeOptions { voxel: 0.5 }).unwrap();
+    let (original, released, secret) = unlift_testkit::described_map(&*scheme, 600);
+    let back = solve(&released, &Overlap.lists(&released, 20, 0).unwrap(), joint());
+    let turned = secret.descriptor_row().iter().map(|row| row ^ 1).collect();
+    let hidden = secret.hidden().to_vec();
+    let wrong = Secret::try_new(hidden, None, turned, Vec::new(), 600, 2).unwrap();
+    let [right, wrong] =
+        [&secret, &wrong].map(|secret| exchanged_percent(&back, &original, secret, 0.25));
+    assert!(right.is_none() && wrong.is_some_and(|percent| percent > 50.0), "{right:?}, {wrong:?}");
 }
 
 /// Lists must state their map and row order, because positions depend on both.
