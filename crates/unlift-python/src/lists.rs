@@ -115,24 +115,15 @@ fn lists_of<const D: usize>(
         let expected = format!("an array of shape ({n_slots}, k), one row per hidden point");
         return Err(wrong("records", expected, shape_text(&shape)));
     }
-    let scores = match scores.map(|scores| numbers("scores", scores)).transpose()? {
-        Some((_, own)) if own != shape => {
-            let expected = format!("the shape of the records, {}", shape_text(&shape));
-            return Err(wrong("scores", expected, shape_text(&own)));
-        }
-        scores => scores.map(|(values, _)| values),
+    let of_shape = |name: &str, own: &[usize]| {
+        let expected = || format!("the shape of the records, {}", shape_text(&shape));
+        if own == shape { Ok(()) } else { Err(wrong(name, expected(), shape_text(own))) }
     };
-    let slots = match slots {
-        Some(slots) => {
-            let (slots, own) = whole("slots", slots, &[2], -1..=n_slots as i64 - 1)?;
-            if own != shape {
-                let expected = format!("the shape of the records, {}", shape_text(&shape));
-                return Err(wrong("slots", expected, shape_text(&own)));
-            }
-            Some(slots)
-        }
-        None => None,
-    };
+    let scores = scores.map(|scores| numbers("scores", scores)).transpose()?;
+    scores.iter().try_for_each(|(_, own)| of_shape("scores", own))?;
+    let slots = slots.map(|slots| whole("slots", slots, &[2], -1..=n_slots as i64 - 1));
+    let slots = slots.transpose()?;
+    slots.iter().try_for_each(|(_, own)| of_shape("slots", own))?;
     let columns = shape[1];
     let (mut offsets, mut kept) = (vec![0], Vec::new());
     for slot in 0..n_slots {
@@ -141,7 +132,7 @@ fn lists_of<const D: usize>(
         offsets.push(kept.len() as u64);
     }
     let records = kept.iter().map(|&at| RecordId(rows[at] as u32)).collect();
-    let scores = scores.map(|scores| kept.iter().map(|&at| scores[at] as f32).collect());
+    let scores = scores.map(|(scores, _)| kept.iter().map(|&at| scores[at] as f32).collect());
     let slots_per_record = released.slots_per_record();
     let lists = neighbors::Neighborhoods::try_new(offsets, records, scores, n, slots_per_record);
     let order = match needs {
@@ -149,7 +140,7 @@ fn lists_of<const D: usize>(
         _ => RowOrder::DescriptorRows,
     };
     let lists = match slots {
-        Some(slots) => {
+        Some((slots, _)) => {
             lists.and_then(|l| l.with_slots(kept.iter().map(|&at| slots[at] as u32).collect()))
         }
         None => lists,

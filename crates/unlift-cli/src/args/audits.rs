@@ -191,7 +191,7 @@ pub struct MapArgs {
     /// File with the descriptors of the points: the COLMAP database.db or hloc features.h5 from
     /// which the model was made, a .npy array with a row per point (for a COLMAP model, by
     /// ascending point id), or a file in unlift's format P3DESC01 (docs/formats.md). Without it,
-    /// audit map uses the database or hloc's features beside the model
+    /// audit map uses those beside the model, and obfuscate none
     #[arg(long, value_name = "FILE")]
     pub descriptors: Option<PathBuf>,
     /// Use a random subset of at most N points
