@@ -115,15 +115,15 @@ fn lists_of<const D: usize>(
         let expected = format!("an array of shape ({n_slots}, k), one row per hidden point");
         return Err(wrong("records", expected, shape_text(&shape)));
     }
-    let of_shape = |name: &str, own: &[usize]| {
+    let check_shape = |name: &str, own: &[usize]| {
         let expected = || format!("the shape of the records, {}", shape_text(&shape));
         if own == shape { Ok(()) } else { Err(wrong(name, expected(), shape_text(own))) }
     };
     let scores = scores.map(|scores| numbers("scores", scores)).transpose()?;
-    scores.iter().try_for_each(|(_, own)| of_shape("scores", own))?;
+    scores.iter().try_for_each(|(_, own)| check_shape("scores", own))?;
     let slots = slots.map(|slots| whole("slots", slots, &[2], -1..=n_slots as i64 - 1));
     let slots = slots.transpose()?;
-    slots.iter().try_for_each(|(_, own)| of_shape("slots", own))?;
+    slots.iter().try_for_each(|(_, own)| check_shape("slots", own))?;
     let columns = shape[1];
     let (mut offsets, mut kept) = (vec![0], Vec::new());
     for slot in 0..n_slots {

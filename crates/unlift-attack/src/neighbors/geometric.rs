@@ -74,29 +74,27 @@ pub(crate) fn geometric_by<const D: usize>(
     let known = peaks.of.iter().enumerate();
     let known = known.filter_map(|(slot, peak)| Some((slot, widen(&peak.as_ref()?.position))));
     let (slots, positions): (Vec<usize>, Vec<[f64; 3]>) = known.unzip();
-    let mut rows: Vec<Vec<(f32, u32)>> = vec![Vec::new(); released.n_slots()];
+    let mut rows: Vec<Vec<(f32, RecordId)>> = vec![Vec::new(); released.n_slots()];
     // There may be no positions at all.
     let Ok(knn) = Knn::new(&positions) else {
         return Neighborhoods::scored(rows, released, RowOrder::Either);
     };
     let per_record = released.slots_per_record();
     let near = |scratch: &mut Vec<(f64, u32)>, at: usize| {
-        let record = |slot: u32| RecordId(slot / per_record as u32);
-        let own = record(slots[at] as u32);
+        let own = RecordId::from_index(slots[at] / per_record);
         let may_list = |record: RecordId| {
             record != own && centers.is_none_or(|c| c[record.index()] != c[own.index()])
         };
         let mut look = LOOK * k;
         loop {
             knn.nearest(at, look, scratch);
-            let mut row: Vec<(f32, u32)> = Vec::new();
+            let mut row: Vec<(f32, RecordId)> = Vec::new();
             for &(squared, near) in scratch.iter() {
-                let slot = slots[near as usize] as u32;
-                let of = record(slot);
-                if may_list(of) && row.iter().all(|&(_, listed)| record(listed) != of) {
-                    let miss = distance_to(released, of, &positions[at]);
+                let record = RecordId::from_index(slots[near as usize] / per_record);
+                if may_list(record) && row.iter().all(|&(_, listed)| listed != record) {
+                    let miss = distance_to(released, record, &positions[at]);
                     let far = (squared.sqrt() + miss) / peaks.resolution;
-                    row.push((-(far as f32), slot));
+                    row.push((-(far as f32), record));
                 }
             }
             // Own records and rays of the own center take up places.

@@ -68,32 +68,29 @@ impl Neighborhoods {
         Ok(Self { offsets, records, scores, slots: None, about: About::default() })
     }
 
-    /// Creates lists of a released map from the (score, slot) of the neighbors of each slot, in any order.
+    /// Creates lists of a released map from the (score, record) of each slot, in any order.
     ///
     /// # Errors
-    /// When a slot is out of range, two are of one record or one is of the own record, or a score is not finite.
+    /// When a record is out of range, twice in a list or the slot's own, or a score is not finite.
     pub(super) fn scored<const D: usize>(
-        rows: impl IntoIterator<Item = Vec<(f32, u32)>>,
+        rows: impl IntoIterator<Item = Vec<(f32, RecordId)>>,
         released: &Released<D>,
         order: RowOrder,
     ) -> Result<Self, Error> {
-        let (n_records, per_record) = (released.n_records(), released.slots_per_record());
-        let (mut offsets, mut slots, mut scores) = (vec![0u64], Vec::new(), Vec::new());
+        let (mut offsets, mut records, mut scores) = (vec![0u64], Vec::new(), Vec::new());
         for row in rows {
             scores.extend(row.iter().map(|&(score, _)| score));
-            slots.extend(row.iter().map(|&(_, slot)| slot));
-            offsets.push(slots.len() as u64);
+            records.extend(row.iter().map(|&(_, record)| record));
+            offsets.push(records.len() as u64);
         }
-        let records = slots.iter().map(|&slot| RecordId(slot / per_record as u32)).collect();
-        let lists = Self::try_new(offsets, records, Some(scores), n_records, per_record)?;
-        let about = About { map: Some(released.fingerprint()), order, ..About::default() };
-        // Of the records alone, it is not known which of two points is meant.
-        let names_slots = per_record == 2 && order == RowOrder::DescriptorRows;
-        Ok(if names_slots { lists.with_slots(slots)? } else { lists }.with_about(about))
+        let (n_records, slots) = (released.n_records(), released.slots_per_record());
+        let lists = Self::try_new(offsets, records, Some(scores), n_records, slots)?;
+        Ok(lists.with_about(About { map: Some(released.fingerprint()), order, ..About::default() }))
     }
 
-    /// Sets which of the two slots of its record each entry means. Without them, an entry means either. `slots` has those of one list after
-    /// the other, within a list in any order. They are numbered as the lists are.
+    /// Sets which of the two slots of its record each entry means. Without them, an entry means either.
+    ///
+    /// `slots` has one list after the other, each in any order. Slots are numbered as the lists are.
     ///
     /// # Errors
     /// When the slots of a list are not one of each of its records.

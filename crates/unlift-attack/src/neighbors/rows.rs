@@ -8,7 +8,7 @@ use super::Neighborhoods;
 use super::kind::comparable;
 use crate::descriptors::Values;
 use crate::released::Released;
-use crate::{Descriptors, Error, RowOrder};
+use crate::{Descriptors, Error, RecordId, RowOrder};
 
 /// Partners of a row, best first.
 pub(super) type Ranked = Vec<(f32, u32)>;
@@ -114,17 +114,25 @@ impl<'a> Rows<'a> {
         for (ranked, &slot) in ranked.iter().zip(&self.slots) {
             ranked_of[slot as usize] = ranked;
         }
-        let record = |slot: u32| slot / self.slots_per_record as u32;
+        let record = |slot: u32| RecordId(slot / self.slots_per_record as u32);
         let list = |ranked: &[(f32, u32)]| {
             let mut list: Vec<(f32, u32)> = Vec::with_capacity(k);
             for &(score, partner) in ranked {
                 let slot = self.slots[partner as usize];
-                if list.len() < k && list.iter().all(|&(_, other)| record(other) != record(slot)) {
+                if list.len() < k && list.iter().all(|entry| record(entry.1) != record(slot)) {
                     list.push((score, slot));
                 }
             }
             list
         };
-        Neighborhoods::scored(ranked_of.into_iter().map(list), released, RowOrder::DescriptorRows)
+        let rows: Vec<Vec<(f32, u32)>> = ranked_of.into_iter().map(list).collect();
+        let records =
+            |row: &Vec<(f32, u32)>| row.iter().map(|&(x, slot)| (x, record(slot))).collect();
+        let order = RowOrder::DescriptorRows;
+        let lists = Neighborhoods::scored(rows.iter().map(records), released, order)?;
+        match self.slots_per_record {
+            1 => Ok(lists),
+            _ => lists.with_slots(rows.into_iter().flatten().map(|entry| entry.1).collect()),
+        }
     }
 }

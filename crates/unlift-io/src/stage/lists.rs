@@ -20,15 +20,16 @@ pub(super) fn written(lists: &Neighborhoods) -> Written<'_> {
     let (n, k) = (lists.n_slots(), lists.longest());
     let mut written = Written::new(Kind::Neighborhoods, n);
     written.state_about(lists.about());
-    let padded = move |slot: usize, entry: &dyn Fn(usize) -> u32| -> Vec<i32> {
-        let list = lists.offsets()[slot] as usize..lists.offsets()[slot + 1] as usize;
-        let list = list.map(|at| entry(at) as i32);
-        list.chain(std::iter::repeat(-1)).take(k).collect()
-    };
-    let records = (0..n).flat_map(move |slot| padded(slot, &|at| lists.records()[at].0));
+    let records = (0..n).flat_map(move |slot| {
+        let list = lists.of(slot).iter().map(|record| record.0 as i32);
+        list.chain(std::iter::repeat(-1)).take(k)
+    });
     written.array("records", &[n, k], records);
     if let Some(slots) = lists.slots() {
-        let slots = (0..n).flat_map(move |slot| padded(slot, &|at| slots[at]));
+        let slots = lists.offsets().windows(2).flat_map(move |ends| {
+            let list = slots[ends[0] as usize..ends[1] as usize].iter().map(|&slot| slot as i32);
+            list.chain(std::iter::repeat(-1)).take(k)
+        });
         written.array("slots", &[n, k], slots);
     }
     if lists.scores().is_some() {

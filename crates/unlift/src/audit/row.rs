@@ -411,8 +411,8 @@ impl Row {
     }
 }
 
-/// The metric [`exchanged_percent`] of a row, which is absent where it is small.
-pub const EXCHANGED: &str = "exchanged_percent";
+/// Metric of a row: the percentage of points recovered at the other point of their line. It is absent where this is usual.
+pub(super) const EXCHANGED: &str = "exchanged_percent";
 
 /// Computes the row of `recovered` and its errors, without the fields that name the cell.
 ///

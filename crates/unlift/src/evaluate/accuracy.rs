@@ -67,7 +67,7 @@ pub fn evaluate<const D: usize>(
 
 /// Returns the percentage of points that are recovered within `threshold` at the other point of their line, if it is so large that the
 /// stated descriptor rows are doubtful; `None` for lists that are not in the order of descriptor rows.
-pub fn exchanged_percent<const D: usize>(
+pub(crate) fn exchanged_percent<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
     secret: &Secret,
@@ -77,9 +77,9 @@ pub fn exchanged_percent<const D: usize>(
         return None;
     }
     let by_row = secret.by_descriptor_row();
-    let [own, other] = [&by_row, &by_row.exchanged(|_| true)]
+    let [straight, crossed] = [&by_row, &by_row.exchanged(|_| true)]
         .map(|secret| compare(recovered, original, secret).percent_within(threshold));
-    (other > MOST_EXCHANGED.0 + MOST_EXCHANGED.1 * own).then_some(other)
+    (crossed > MOST_EXCHANGED.0 + MOST_EXCHANGED.1 * straight).then_some(crossed)
 }
 
 /// Usual percentage of points recovered at the other point of their line: a constant, and a share of those recovered at their own.

@@ -2,8 +2,6 @@
 //!
 //! It simulates an attacker of known quality. No other source reads ground truth.
 
-use std::cmp::Ordering;
-
 use rayon::prelude::*;
 
 use super::Neighborhoods;
@@ -250,7 +248,9 @@ pub fn from_points(
         let row = offsets[original.index()] as usize..offsets[original.index() + 1] as usize;
         let mut row: Vec<usize> = row.collect();
         // Of the two points of a line, the one with the better score is listed.
-        row.sort_by(|&a, &b| scores.map_or(Ordering::Equal, |s| s[b].total_cmp(&s[a])));
+        if let Some(scores) = scores {
+            row.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
+        }
         for at in row {
             let Some(near) = slot_of[neighbors[at] as usize] else { continue };
             let record = RecordId::from_index(near / slots_per_record);

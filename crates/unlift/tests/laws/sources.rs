@@ -1,6 +1,7 @@
 //! Properties of all sources that compare descriptors, and of each source's purpose.
 
-use unlift::evaluate::exchanged_percent;
+use unlift::audit::doubts::exchanged;
+use unlift::audit::measure;
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Overlap, Similarity, Source};
 
@@ -226,9 +227,11 @@ fn wrong_descriptor_rows_are_told() {
     let turned = secret.descriptor_row().iter().map(|row| row ^ 1).collect();
     let hidden = secret.hidden().to_vec();
     let wrong = Secret::try_new(hidden, None, turned, Vec::new(), 600, 2).unwrap();
-    let [right, wrong] =
-        [&secret, &wrong].map(|secret| exchanged_percent(&back, &original, secret, 0.25));
-    assert!(right.is_none() && wrong.is_some_and(|percent| percent > 50.0), "{right:?}, {wrong:?}");
+    let thresholds = Plan::<3>::new(Unit::Meter).thresholds;
+    let doubt =
+        |secret| exchanged(&measure(&back, &original, secret, None, &thresholds).unwrap().0);
+    assert_eq!(doubt(&secret), None);
+    assert!(doubt(&wrong).unwrap().contains("at the other point of their line"));
 }
 
 /// Lists must state their map and row order, because positions depend on both.
