@@ -9,12 +9,14 @@ use rayon::prelude::*;
 
 use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
-use partners::{LOST, Partners, Side, by_part, side_by_side};
+use partners::{LOST, Partners, Side};
 
 /// Number of rounds: fixed, so that time does not depend on the map.
 const ROUNDS: usize = 6;
 /// Pairs below this probability do not enter learning: they are many, but weigh little together.
 const LEAST_PROBABILITY: f32 = 1e-3;
+/// Records per parallel task: fixed, so that sums do not depend on the number of threads.
+const PART: usize = 1 << 10;
 /// Number of classes of evidence, with equally many records each. More evidence means smaller distances.
 const CLASSES: usize = 8;
 /// Normal distributions in the mixture of distances. Each is half as wide as the one before, down to 1 / 512 of the reach.
@@ -60,8 +62,6 @@ fn pairs<const D: usize>(
         }
     };
     let sides: Vec<Side> = published.iter().zip(estimates).map(side).collect();
-    let order = side_by_side(&sides, reach);
-    let sides: Vec<Side> = order.iter().map(|&record| sides[record as usize]).collect();
     let Some(partners) = Partners::find(&sides, reach) else {
         return vec![None; n];
     };
@@ -72,7 +72,6 @@ fn pairs<const D: usize>(
         1.0 / n.saturating_sub(1).max(1) as f64
     });
     let class = classes(estimates);
-    let class: Vec<usize> = order.iter().map(|&record| class[record as usize]).collect();
     let mut distances = Distances::new(partners.reach);
     // Per entry, the message that the record is free of other partners.
     let mut messages = vec![0.5; partners.of.len()];
@@ -98,9 +97,9 @@ fn pairs<const D: usize>(
             let message = |e: usize| 1.0 / (all - offer(e)).max(alone);
             row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = message(e));
         });
-        let tallies = by_part(n, |records| {
+        let tally = |part: usize| {
             let mut tally = vec![[0.0; STEPS]; CLASSES];
-            for i in records {
+            for i in part * PART..n.min((part + 1) * PART) {
                 for e in partners.entries(i) {
                     let away = (sides[partners.of[e] as usize].published - sides[i].estimate).abs();
                     let p = probability(&messages, &partners, &weight, e);
@@ -110,7 +109,8 @@ fn pairs<const D: usize>(
                 }
             }
             tally
-        });
+        };
+        let tallies: Vec<_> = (0..n.div_ceil(PART)).into_par_iter().map(tally).collect();
         let mut total = vec![[0.0; STEPS]; CLASSES];
         for tally in &tallies {
             let columns = total.as_flattened_mut().iter_mut().zip(tally.as_flattened());
@@ -129,12 +129,8 @@ fn pairs<const D: usize>(
         Some(partners.of[best.1])
     };
     let best: Vec<Option<u32>> = (0..n).into_par_iter().map(best).collect();
-    let mut of_record = vec![None; n];
-    for (i, &record) in order.iter().enumerate() {
-        let mutual = best[i].filter(|&j| best[j as usize] == Some(i as u32));
-        of_record[record as usize] = mutual.map(|j| order[j as usize]);
-    }
-    of_record
+    let mutual = |i: usize| best[i].filter(|&j| best[j as usize] == Some(i as u32));
+    (0..n).map(mutual).collect()
 }
 
 #[inline(always)]
