@@ -182,8 +182,8 @@ fn exponential(y: f32) -> f32 {
 #[derive(Default)]
 struct Terms<const D: usize> {
     /// The targets that the slot lists, and the slots that list it, or its record.
-    listed: Marks,
-    lists: Marks,
+    listed: Vec<bool>,
+    lists: Vec<bool>,
     /// Radius at the center, and the number of estimates within it.
     radius: f32,
     length: f32,
@@ -191,27 +191,6 @@ struct Terms<const D: usize> {
     terms: Vec<Term>,
     /// Per term, its squared distance to a place, and twice its component along a direction.
     aimed: Vec<[f32; 2]>,
-}
-
-/// A set of small numbers, one bit each: those of a large map stay in the cache.
-#[derive(Default)]
-struct Marks(Vec<u64>);
-
-impl Marks {
-    fn resize(&mut self, n: usize) {
-        self.0.resize(n.div_ceil(64), 0);
-    }
-
-    #[inline(always)]
-    fn set(&mut self, at: usize, to: bool) {
-        let (word, bit) = (&mut self.0[at / 64], 1 << (at % 64));
-        *word = if to { *word | bit } else { *word & !bit };
-    }
-
-    #[inline(always)]
-    fn has(&self, at: usize) -> bool {
-        self.0[at / 64] >> (at % 64) & 1 == 1
-    }
 }
 
 /// What the likelihood reads of an estimate. In the tree's order, near estimates are near in memory.
@@ -415,12 +394,12 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
         let place = |slot: usize| &estimates[slot].position;
         let at = place(center);
         let mark = |terms: &mut Terms<D>, to: bool| {
-            lists.targets(slot).for_each(|target| terms.listed.set(target, to));
+            lists.targets(slot).for_each(|target| terms.listed[target] = to);
             let listers = graph.listers.of(record_of(slot, graph.slots_per_target));
-            listers.iter().for_each(|&slot| terms.lists.set(slot as usize, to));
+            listers.iter().for_each(|&slot| terms.lists[slot as usize] = to);
         };
-        terms.listed.resize(estimates.len());
-        terms.lists.resize(estimates.len());
+        terms.listed.resize(estimates.len(), false);
+        terms.lists.resize(estimates.len(), false);
         mark(terms, true);
         terms.radius = radius[center];
         terms.length = lists.of(center).len() as f32;
@@ -437,14 +416,14 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 if of == record || squared_distance(&center, &x.map(f64::from)) > reach2 {
                     continue;
                 }
-                let is_listed = terms.listed.has(record_of(other, graph.slots_per_target));
+                let is_listed = terms.listed[record_of(other, graph.slots_per_target)];
                 // Of the two slots of a listed record, the nearer one is meant.
                 let is_farther = is_listed && is_either && {
                     let (own, other_slot) = (distance2(&x, at), distance2(place(other ^ 1), at));
                     other_slot < own || (other_slot == own && other % 2 == 1)
                 };
                 n_near += usize::from(is_listed && !is_farther);
-                let lists_slot = terms.lists.has(other);
+                let lists_slot = terms.lists[other];
                 let most = partner.filter(|_| lists_slot).map(|partner| distance2(partner, &x));
                 terms.terms.push(Term {
                     inverse,

@@ -38,25 +38,34 @@ impl Partners {
     pub(super) fn find(sides: &[Side], reach: f32) -> Option<Self> {
         let (mut pairs, mut farthest) = (Vec::new(), Vec::new());
         let axes = sides.iter().map(|side| side.axis).filter(|&axis| axis != LOST).max()? + 1;
+        let place = |&record: &u32| {
+            let Side { published, estimate, .. } = sides[record as usize];
+            [f64::from(published), f64::from(estimate)]
+        };
         for axis in 0..axes {
             let on_axis = |&record: &u32| sides[record as usize].axis == axis;
-            let records: Vec<u32> = (0..sides.len() as u32).filter(on_axis).collect();
-            let place = |&record: &u32| {
-                let Side { published, estimate, .. } = sides[record as usize];
-                [f64::from(published), f64::from(estimate)]
+            let mut records: Vec<u32> = (0..sides.len() as u32).filter(on_axis).collect();
+            let by_place = |a: &u32, b: &u32| {
+                let ([a, a2], [b, b2]) = (place(a), place(b));
+                a.total_cmp(&b).then(a2.total_cmp(&b2))
             };
-            let places: Vec<[f64; 2]> = records.iter().map(place).collect();
+            records.par_sort_by(by_place);
+            // Of records at one place (on a floor at 0), some are enough: a search visits all that coincide.
+            let equal = records.chunk_by(|a, b| place(a) == place(b));
+            let searched: Vec<u32> =
+                equal.flat_map(|equal| equal.iter().take(FOUND)).copied().collect();
+            let places: Vec<[f64; 2]> = searched.iter().map(place).collect();
             let Ok(tree) = Knn::new(&places) else { continue };
-            let near = |found: &mut Vec<(f64, u32)>, (&record, &[a, b]): (&u32, &[f64; 2])| {
-                tree.nearest_to([b, a], FOUND, found);
+            let near = |found: &mut Vec<(f64, u32)>, record: &u32| {
+                let [published, estimate] = place(record);
+                tree.nearest_to([estimate, published], FOUND, found);
                 let far = found.get(FOUND - 1).map_or(f64::INFINITY, |last| last.0.sqrt());
-                let others = found.iter().map(|&(far2, row)| (far2, records[row as usize]));
-                let others = others.filter(|&(_, other)| other != record);
-                let pairs = others.map(|(far2, other)| (far2.sqrt(), record, other));
+                let others = found.iter().map(|&(far2, row)| (far2, searched[row as usize]));
+                let others = others.filter(|(_, other)| other != record);
+                let pairs = others.map(|(far2, other)| (far2.sqrt(), *record, other));
                 (far, pairs.collect::<Vec<_>>())
             };
-            let found = records.par_iter().zip(&places).map_init(Vec::new, near);
-            for (far, found) in found.collect::<Vec<_>>() {
+            for (far, found) in records.par_iter().map_init(Vec::new, near).collect::<Vec<_>>() {
                 farthest.push(far);
                 pairs.extend(found);
             }
@@ -93,5 +102,24 @@ impl Partners {
 
     pub(super) fn entries(&self, i: usize) -> Range<usize> {
         self.offsets[i]..self.offsets[i + 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All records lie on a floor at exactly 0, so each is a possible partner of all others.
+    #[test]
+    fn equal_coordinates_have_as_many_partners_as_are_found() {
+        let sides = vec![Side { axis: 2, published: 0.0, estimate: 0.0 }; 200_000];
+        let partners = Partners::find(&sides, 0.1).unwrap();
+        let n = partners.of.len() / sides.len();
+        assert!((FOUND..=2 * FOUND).contains(&n), "{n} partners a record");
+        for i in [0, 777, 199_999] {
+            let entry = partners.entries(i).start;
+            let (j, back) = (partners.of[entry] as usize, partners.back[entry] as usize);
+            assert!(partners.entries(j).contains(&back) && partners.of[back] as usize == i);
+        }
     }
 }

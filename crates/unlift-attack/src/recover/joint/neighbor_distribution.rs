@@ -21,8 +21,6 @@ const OUTSIDE: usize = BINS / 4 * 3;
 const ENOUGH: f64 = 250.0;
 /// Mutual edges give the radius if theirs is below this fraction of the radius of all edges.
 const TIGHTER: f64 = 0.65;
-/// Fraction of true neighbors that is lost with their tail when the background is subtracted, measured with uniform noise.
-const TAIL: f64 = 0.1;
 /// Bounds of the fraction of true neighbors in a class, so that odds are neither 0 nor infinite.
 const FRACTION: (f64, f64) = (5e-4, 0.95);
 
@@ -36,8 +34,6 @@ pub(super) struct NeighborDistribution {
     /// `1 / a^2`, and the density of true neighbors at `r = 0`.
     pub(super) inverse_a2: f32,
     pub(super) density_at_zero: f32,
-    /// Density of wrong entries that lie in the same region of the map, times the odds of an entry; uniform within the reach.
-    pub(super) background: f32,
     /// Bound on the imbalance of forward and reverse edges, in nats; infinite where wrong entries form no clusters.
     pub(super) most_imbalance: f32,
 }
@@ -111,53 +107,37 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
         let parts: Vec<Tally> = sample.par_chunks(256).map(part).collect();
         let mut tally = Tally::ZERO;
         parts.iter().for_each(|part| tally.merge(part));
-        let [(all, fraction_of_all), (mutual, fraction_of_mutual)] =
-            [0, 1].map(|kind| tally.excess::<D>(kind));
+        let [all, mutual] = [0, 1].map(|kind| tally.excess::<D>(kind));
         let mut radius = median_radius(&all);
         // Wrong entries in the same region are rarely mutual.
         if mutual.iter().sum::<f64>() >= ENOUGH && median_radius(&mutual) < TIGHTER * radius {
             radius = median_radius(&mutual);
         }
         let radius = (radius as f32 * reach).min(F::MOST_RADIUS * delta).max(least_radius);
-        // The radius that holds half of the mass of `(1 + r^2)^-3`, the mass, and the volume of the unit ball.
-        let (median, mass, ball) = match D {
-            2 => (0.643_594_25, std::f32::consts::PI / 2.0, std::f64::consts::PI),
-            _ => (
-                1.0,
-                std::f32::consts::PI * std::f32::consts::PI / 4.0,
-                4.0 / 3.0 * std::f64::consts::PI,
-            ),
+        // The radius that holds half of the mass of `(1 + r^2)^-3`, and the mass.
+        let (median, mass) = match D {
+            2 => (0.643_594_25, std::f32::consts::PI / 2.0),
+            _ => (1.0, std::f32::consts::PI * std::f32::consts::PI / 4.0),
         };
         let a = radius / median;
         let chance = tally.random.map(close_fraction);
         let mut odds = [0.0; CLASSES];
-        let (mut edges, mut ends, mut neighbors, mut n_background) = (0.0, 0.0, 0.0, 0.0);
+        let (mut ends, mut neighbors) = (0.0, 0.0);
         for (class, of_class) in tally.classes.iter().enumerate() {
             let is_either = graph.is_either(class as u8);
             let close = true_fraction(close_fraction(*of_class), chance[usize::from(is_either)]);
-            let of_close = match side(class as u8) {
-                _ if !F::SUBTRACTS_BACKGROUND => 1.0,
-                Side::Mutual => fraction_of_mutual,
-                Side::Forward | Side::Reverse => fraction_of_all,
-            };
-            let p = (close * of_close).max(FRACTION.0);
-            odds[class] = (p / (1.0 - p)) as f32;
+            odds[class] = (close / (1.0 - close)) as f32;
             let n = of_class[0];
-            edges += n;
             // Of the two slots of a record, only one can be a neighbor.
             ends += if is_either { 2.0 * n } else { n };
             neighbors += n * close;
-            n_background += n * close * (1.0 - of_close);
         }
-        let background = (n_background / f64::max(edges, 1.0)).min(FRACTION.1);
-        let volume = ball * f64::from(reach).powi(D as i32);
         NeighborDistribution {
             radius,
             fraction: (neighbors / f64::max(ends, 1.0)) as f32,
             odds,
             inverse_a2: 1.0 / (a * a),
             density_at_zero: 1.0 / (mass * a.powi(D as i32)),
-            background: (background / (1.0 - background) / volume) as f32,
             most_imbalance: self.most_imbalance(),
         }
     }
@@ -228,8 +208,8 @@ impl Tally {
         add(&mut self.random, &part.random);
     }
 
-    /// Returns close edges beyond chance and background per bin, and their fraction among those beyond chance, for all or mutual edges.
-    fn excess<const D: usize>(&self, kind: usize) -> ([f64; BINS], f64) {
+    /// Returns close edges per bin beyond chance and beyond wrong entries of the same region, for all or mutual edges.
+    fn excess<const D: usize>(&self, kind: usize) -> [f64; BINS] {
         let bins = &self.bins[kind];
         let of_kind = |class: &usize| kind == 0 || side(*class as u8) == Side::Mutual;
         let edges: f64 = (0..CLASSES).filter(of_kind).map(|class| self.classes[class][0]).sum();
@@ -245,9 +225,7 @@ impl Tally {
             _ => excess[OUTSIDE..].iter().sum::<f64>().max(0.0),
         };
         let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
-        let neighbors = std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0));
-        let fraction = neighbors.iter().sum::<f64>() / excess.iter().sum::<f64>().max(1.0);
-        (neighbors, (fraction / (1.0 - TAIL)).min(1.0))
+        std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0))
     }
 }
 

@@ -99,19 +99,9 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     #[inline(always)]
     pub(super) fn distribution(&self, density: f32) -> (f32, f32) {
         let stretch = self.density.stretch(density);
-        let gain = self.neighbors.density_at_zero / (self.volume(density) * density);
+        let volume: f32 = [stretch; D].iter().product();
+        let gain = self.neighbors.density_at_zero / (volume * density);
         (gain, self.neighbors.inverse_a2 / (stretch * stretch))
-    }
-
-    /// Returns the volume of a cube whose edge is the local stretch.
-    #[inline(always)]
-    pub(super) fn volume(&self, density: f32) -> f32 {
-        let stretch = self.density.stretch(density);
-        let mut volume = 1.0;
-        for _ in 0..D {
-            volume *= stretch;
-        }
-        volume
     }
 
     /// Adds the candidates of one piece: projected estimates of neighbors, and the old estimate.
@@ -280,9 +270,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             let density = field.at(&x);
             let reach = RADIUS * neighbors.radius * field.stretch(density);
             let inverse_reach2 = 1.0 / (reach * reach);
-            let half_weight_ratio = F::HALF_WEIGHT_RATIO
-                * (1.0 + neighbors.background / self.volume(density) / density);
-            let weights = (inverse_reach2, self.distribution(density), half_weight_ratio);
+            let weights = (inverse_reach2, self.distribution(density), F::HALF_WEIGHT_RATIO);
             let sums = Sums::new(near, directions, &x, weights);
             let n: u32 = sums.n.iter().sum();
             if step_at == STEPS {

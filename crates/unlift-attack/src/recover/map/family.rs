@@ -67,8 +67,6 @@ pub(crate) trait Family<const D: usize>: Sync {
     const ALONG: f32 = 2.0;
     /// In least squares, an estimate has half weight at this likelihood ratio of a true neighbor against chance.
     const HALF_WEIGHT_RATIO: f32 = 1.0;
-    /// Whether wrong entries of the same region count as background: along a line they would draw a place into the middle of its region.
-    const SUBTRACTS_BACKGROUND: bool = false;
     /// Largest radius of the distribution of neighbors, in deltas. Without it, the radius would grow where most estimates are wrong.
     const MOST_RADIUS: f32 = 0.95;
 
@@ -192,7 +190,6 @@ impl<const D: usize> LineFamily<D> {
 impl<const D: usize> Family<D> for LineFamily<D> {
     const MOST_ALONG: f32 = 0.35;
     const ALONG: f32 = 50.0;
-    const SUBTRACTS_BACKGROUND: bool = true;
 
     /// The volume per length of a tube of radius delta.
     type AtDelta = f32;
