@@ -8,8 +8,8 @@ use crate::geometry::knn::Knn;
 use crate::geometry::vector::median;
 use crate::recover::map::rows_mut;
 
-/// Number of possible partners that each record finds; others may find it, too.
-const FOUND: usize = 16;
+/// Number of nearest places in which each record looks for its partner.
+const NEAREST: usize = 16;
 
 /// A record, on the axis that it is believed to have exchanged.
 #[derive(Clone, Copy, Debug)]
@@ -34,9 +34,10 @@ pub(super) struct Partners {
 
 impl Partners {
     /// Finds, for each record, the records of its axis that explain it best: in the plane of published values and estimates, those near
-    /// its own values in exchanged order. Distances are at most `reach`, and at most what half of the records need to find [`FOUND`].
+    /// its own values in exchanged order. Distances are at most `reach`, and at most those at which half of the records of an axis have
+    /// [`NEAREST`] of them.
     pub(super) fn find(sides: &[Side], reach: f32) -> Option<Self> {
-        let (mut pairs, mut farthest) = (Vec::new(), Vec::new());
+        let (mut pairs, mut typical) = (Vec::new(), 0.0f64);
         let axes = sides.iter().map(|side| side.axis).filter(|&axis| axis != LOST).max()? + 1;
         let place = |&record: &u32| {
             let Side { published, estimate, .. } = sides[record as usize];
@@ -53,30 +54,33 @@ impl Partners {
             // Of records at one place (on a floor at 0), some are enough: a search visits all that coincide.
             let equal = records.chunk_by(|a, b| place(a) == place(b));
             let searched: Vec<u32> =
-                equal.flat_map(|equal| equal.iter().take(FOUND)).copied().collect();
+                equal.flat_map(|equal| equal.iter().take(NEAREST)).copied().collect();
             let places: Vec<[f64; 2]> = searched.iter().map(place).collect();
             let Ok(tree) = Knn::new(&places) else { continue };
-            let near = |found: &mut Vec<(f64, u32)>, record: &u32| {
+            let near = |nearest: &mut Vec<(f64, u32)>, record: &u32| {
                 let [published, estimate] = place(record);
-                tree.nearest_to([estimate, published], FOUND, found);
-                let far = found.get(FOUND - 1).map_or(f64::INFINITY, |last| last.0.sqrt());
-                let others = found.iter().map(|&(far2, row)| (far2, searched[row as usize]));
-                let others = others.filter(|(_, other)| other != record);
-                let pairs = others.map(|(far2, other)| (far2.sqrt(), *record, other));
-                (far, pairs.collect::<Vec<_>>())
+                tree.nearest_to([estimate, published], NEAREST, nearest);
+                let radius = nearest.get(NEAREST - 1).map_or(f64::INFINITY, |last| last.0.sqrt());
+                let pair = |&(squared, row): &(f64, u32)| {
+                    (squared.sqrt(), *record, searched[row as usize])
+                };
+                let pairs = nearest.iter().map(pair).filter(|&(_, own, partner)| own != partner);
+                (radius, pairs.collect::<Vec<_>>())
             };
-            for (far, found) in records.par_iter().map_init(Vec::new, near).collect::<Vec<_>>() {
-                farthest.push(far);
-                pairs.extend(found);
-            }
+            let rows = records.par_iter().map_init(Vec::new, near);
+            let (mut radii, rows): (Vec<f64>, Vec<Vec<_>>) = rows.unzip();
+            // The largest median: on a flat map, places of one axis coincide, and those of the others do not.
+            typical = typical.max(median(&mut radii));
+            pairs.extend(rows.into_iter().flatten());
         }
-        let reach = f64::from(reach).min(median(&mut farthest));
-        pairs.retain(|&(far, ..)| far <= reach);
+        let reach = reach.min(typical as f32);
+        pairs.retain(|&(distance, ..)| distance <= f64::from(reach));
         let both = pairs.into_iter().flat_map(|(_, i, j)| [(i, j), (j, i)]);
         let mut pairs: Vec<(u32, u32)> = both.collect();
         pairs.par_sort_unstable();
         pairs.dedup();
-        if pairs.is_empty() || u32::try_from(pairs.len()).is_err() {
+        // Where all places of all axes coincide, no exact value would move a point.
+        if reach <= 0.0 || pairs.is_empty() || u32::try_from(pairs.len()).is_err() {
             return None;
         }
         let start = |i: usize| pairs.partition_point(|pair| (pair.0 as usize) < i);
@@ -89,7 +93,7 @@ impl Partners {
         };
         let back = pairs.iter().map(back).collect();
         let of = pairs.into_iter().map(|(_, j)| j).collect();
-        Some(Self { offsets, of, back, reach: reach as f32 })
+        Some(Self { offsets, of, back, reach })
     }
 
     /// Returns a value per entry; `of` writes those of one record.
@@ -109,14 +113,25 @@ impl Partners {
 mod tests {
     use super::*;
 
-    /// All records lie on a floor at exactly 0, so each is a possible partner of all others.
+    /// On a flat map, all records of one axis coincide. Those of the others still have their partners.
     #[test]
-    fn equal_coordinates_have_as_many_partners_as_are_found() {
-        let sides = vec![Side { axis: 2, published: 0.0, estimate: 0.0 }; 200_000];
+    fn partners_are_near_also_where_all_records_of_an_axis_coincide() {
+        let mut sides = vec![Side { axis: 2, published: 0.0, estimate: 0.0 }; 200_000];
+        let flat = sides.len();
+        let value = |i: usize| (i as f32 * 0.618_034).fract();
+        for pair in 0..1000 {
+            let [a, b] = [value(2 * pair), value(2 * pair + 1)];
+            sides.push(Side { axis: 0, published: a, estimate: b + 0.001 });
+            sides.push(Side { axis: 0, published: b, estimate: a - 0.001 });
+        }
         let partners = Partners::find(&sides, 0.1).unwrap();
-        let n = partners.of.len() / sides.len();
-        assert!((FOUND..=2 * FOUND).contains(&n), "{n} partners a record");
-        for i in [0, 777, 199_999] {
+        assert!(partners.reach > 0.01, "{}", partners.reach);
+        assert!(partners.of.len() < 3 * NEAREST * sides.len());
+        for i in [flat, flat + 1, flat + 1998, flat + 1999] {
+            let partner = (i ^ 1) as u32;
+            assert!(partners.of[partners.entries(i)].contains(&partner), "{i}");
+        }
+        for i in [0, 777, flat - 1, flat] {
             let entry = partners.entries(i).start;
             let (j, back) = (partners.of[entry] as usize, partners.back[entry] as usize);
             assert!(partners.entries(j).contains(&back) && partners.of[back] as usize == i);
