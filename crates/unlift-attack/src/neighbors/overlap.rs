@@ -9,7 +9,7 @@ use super::sources::{Needs, Source};
 use super::walk::{Walk, ranked_by};
 use crate::descriptors::Values;
 use crate::released::Released;
-use crate::simd::BLOCK;
+use crate::simd::{BLOCK, QUAD, packed};
 use crate::{Descriptors, Error, ErrorKind, simd};
 
 /// Number of classes of shifts: 0 cells, 1 cell, more.
@@ -103,7 +103,6 @@ impl Likeness for Hypotheses {
         let (of_turned, of_still) = (starts(&self.turned), starts(&self.still));
         let mut turned = vec![0; of_turned[self.turned.len()]];
         let mut still = vec![0; of_still[self.still.len()]];
-        let mut bytes = [0u8; DIM];
         let mut mixed = vec![Mixed::default(); self.cells.len()];
         for (row, &slot) in slots.iter().enumerate() {
             let squares = squares(descriptors, slot as usize);
@@ -111,16 +110,16 @@ impl Likeness for Hypotheses {
                 *mixed = Mixed::new(&squares, cell);
             }
             for (version, start) in self.turned.iter().zip(&of_turned) {
-                let depth = version.depth();
-                quantize(&mixed, version, &mut bytes);
-                let at = start + row * depth;
-                turned[at..at + depth].copy_from_slice(&bytes[..depth]);
+                let at = start + row * version.depth();
+                let cells = turned[at..at + version.depth()].as_chunks_mut().0;
+                cells.iter_mut().zip(quantized(&mixed, version)).for_each(|(to, cell)| *to = cell);
             }
             for (version, start) in self.still.iter().zip(&of_still) {
-                let depth = version.depth();
-                quantize(&mixed, version, &mut bytes);
-                for (at, &byte) in bytes[..depth].iter().enumerate() {
-                    still[start + simd::packed(row, at, depth)] = byte as i8;
+                for (at, cell) in quantized(&mixed, version).enumerate() {
+                    for (half, four) in cell.as_chunks::<QUAD>().0.iter().enumerate() {
+                        let first = start + packed(row, at * BINS + half * QUAD, version.depth());
+                        still[first..first + QUAD].copy_from_slice(&four.map(|byte| byte as i8));
+                    }
                 }
             }
         }
@@ -168,9 +167,14 @@ impl Hypotheses {
                 product(&b.turned[left], &a.still[right], &mut back);
             }
         }
-        for i in 0..BLOCK {
-            for j in 0..BLOCK {
-                scores[i * BLOCK + j] = f32::from(forth[i * BLOCK + j].max(back[j * BLOCK + i]));
+        // Squares that fit the cache, as `back` is read across its rows.
+        const SIDE: usize = 16;
+        for (i, j) in (0..BLOCK / SIDE).flat_map(|i| (0..BLOCK / SIDE).map(move |j| (i, j))) {
+            for i in i * SIDE..(i + 1) * SIDE {
+                for j in j * SIDE..(j + 1) * SIDE {
+                    let best = forth[i * BLOCK + j].max(back[j * BLOCK + i]);
+                    scores[i * BLOCK + j] = f32::from(best);
+                }
             }
         }
     }
@@ -199,10 +203,10 @@ fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
     std::array::from_fn(|cell| std::array::from_fn(|bin| squares[cell * BINS + bin] / sum))
 }
 
-/// The histogram of a cell after a turn, and the square roots of its values.
+/// A cell after a turn: the sum of its histogram, and the square roots of its values.
 #[derive(Clone, Copy, Default)]
 struct Mixed {
-    values: [f32; BINS],
+    sum: f32,
     roots: [f32; BINS],
 }
 
@@ -215,24 +219,21 @@ impl Mixed {
                 *value += square * share;
             }
         }
+        let sum = values.iter().sum();
         // Orientations of a descriptor turn in the opposite sense of the grid.
         values.rotate_left(cell.turn);
-        Self { values, roots: values.map(f32::sqrt) }
+        values.iter_mut().for_each(|value| *value = value.sqrt());
+        Self { sum, roots: values }
     }
 }
 
-fn quantize(mixed: &[Mixed], version: &Version, bytes: &mut [u8; DIM]) {
+/// Returns the cells of a version as bytes.
+fn quantized(mixed: &[Mixed], version: &Version) -> impl Iterator<Item = [u8; BINS]> {
     let cells = || version.cells.iter().map(|&cell| &mixed[usize::from(cell)]);
-    let norm = cells().flat_map(|cell| cell.values).sum::<f32>().sqrt().max(NORM_FLOOR);
+    let norm = cells().map(|cell| cell.sum).sum::<f32>().sqrt().max(NORM_FLOOR);
     let scale = LENGTH * version.root_weight / norm;
-    for (bytes, cell) in bytes.as_chunks_mut::<BINS>().0.iter_mut().zip(cells()) {
-        for (byte, root) in bytes.iter_mut().zip(cell.roots) {
-            // Rounds without a call: no value is negative.
-            let value = root * scale;
-            let whole = value as i32;
-            *byte = (whole + i32::from(value - whole as f32 >= 0.5)) as u8;
-        }
-    }
+    // Adding 2^23 rounds to the nearest integer, in the low bits.
+    cells().map(move |cell| cell.roots.map(|root| (root * scale + 8_388_608.0).to_bits() as u8))
 }
 
 // Hypotheses about how two patches overlap: a turn by a multiple of 45 degrees, then a shift by cells.
