@@ -41,6 +41,9 @@ mod error;
 pub mod geometry;
 mod named;
 pub mod neighbors;
+// Not part of the interface: the other crates run their loops through it.
+#[doc(hidden)]
+pub mod parallel;
 pub mod points;
 pub mod protected;
 pub mod recover;

@@ -4,9 +4,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use rayon::prelude::*;
-
 use crate::descriptors::Values;
+use crate::parallel;
 use crate::simd::{self, Kernel};
 use crate::{Descriptors, Error};
 
@@ -177,7 +176,7 @@ impl ProtectedDescriptors {
                     }
                 }
             };
-            let rows: Vec<Vec<f32>> = (0..self.len()).into_par_iter().map(of).collect();
+            let rows: Vec<Vec<f32>> = parallel::map(self.len(), of);
             let scaled = rows.into_iter().flat_map(|mut row| {
                 if self.bytes {
                     row.iter_mut().for_each(|x| *x = x.max(0.0));

@@ -1,8 +1,7 @@
 //! Where two records meet, and how far a link is trusted whose records miss each other by a distance.
 
-use rayon::prelude::*;
-
 use crate::geometry::vector::{along, cross, dot, sub};
+use crate::parallel;
 use crate::simd;
 use crate::simd::Kernel;
 
@@ -79,7 +78,8 @@ pub(super) struct Near {
 /// Returns the [`KEPT`] lines of `others` that pass each record of `per_record` lines most closely, nearest first.
 pub(super) fn search(lines: &[Line], per_record: usize, others: &[Line]) -> Vec<Vec<Near>> {
     let columns = columns(others);
-    let of_record = |(record, own): (usize, &[Line])| {
+    let of_record = |record: usize| {
+        let own = &lines[record * per_record..(record + 1) * per_record];
         let mut near: Vec<Near> = Vec::with_capacity(KEPT + 1);
         for (at, line) in own.iter().enumerate() {
             let (line, own) = (*line, (record * per_record + at) as u32);
@@ -87,7 +87,7 @@ pub(super) fn search(lines: &[Line], per_record: usize, others: &[Line]) -> Vec<
         }
         near
     };
-    lines.par_chunks(per_record).enumerate().map(of_record).collect()
+    parallel::map(lines.len() / per_record, of_record)
 }
 
 fn columns(lines: &[Line]) -> [Vec<f64>; 6] {

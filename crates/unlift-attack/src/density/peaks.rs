@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::Peaks;
 use super::feasible::{Feasible, Hides};
 use super::spread::Spread;
+use crate::parallel;
 use crate::recover::map::LineRow;
 use crate::recover::result::Estimate;
 
@@ -31,11 +30,11 @@ pub(super) fn find(spread: &Spread<'_>) -> Peaks {
         let estimate = |window: Window| {
             peak(&window, &lines[record * per_record + window.axis], total, view.len())
         };
-        let estimates = pair.map_or([None; 2], |pair| pair.map(estimate));
-        estimates.into_iter().take(slots)
+        pair.map_or([None; 2], |pair| pair.map(estimate))
     };
     let scratch = || (Vec::new(), Vec::new());
-    let of = (0..n_records).into_par_iter().map_init(scratch, place).flatten_iter().collect();
+    let found = parallel::map_with(n_records, scratch, place);
+    let of = found.into_iter().flat_map(|of_record| of_record.into_iter().take(slots)).collect();
     Peaks { of, resolution: f64::from(spread.grid.cell) }
 }
 

@@ -3,9 +3,8 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use rayon::prelude::*;
-
 use super::feasible::{Feasible, Hides};
+use crate::parallel;
 use crate::recover::map::{Grid, LineRow, rows_mut};
 
 /// Rounds on each grid. From 4 to 20 rounds, recovered fractions on procedural rooms change by less than half a point.
@@ -28,7 +27,7 @@ pub(super) struct Spread<'a> {
 impl<'a> Spread<'a> {
     pub(super) fn new(feasible: &'a Feasible, grid: Grid<3>) -> Self {
         let spans: Vec<Range<i32>> =
-            feasible.lines.par_iter().map(|line| grid.span(line)).collect();
+            parallel::map(feasible.lines.len(), |at| grid.span(&feasible.lines[at]));
         let (mut offsets, mut n_samples) = (vec![0], 0);
         for spans in spans.chunks(feasible.per_record) {
             n_samples += spans.iter().map(|span| span.len()).sum::<usize>();
@@ -73,9 +72,9 @@ impl<'a> Spread<'a> {
     /// Expectation: computes the weights from the density.
     fn expect(&mut self) {
         let mut weights = std::mem::take(&mut self.weights);
-        let rows = rows_mut(&mut weights, &self.offsets);
+        let mut rows = rows_mut(&mut weights, &self.offsets);
         let this = &*self;
-        rows.into_par_iter().enumerate().for_each_init(Vec::new, |view, (record, row)| {
+        parallel::for_each_mut(&mut rows, Vec::new, |view, record, row| {
             this.view(record, row, view);
             let mut points = 1.0;
             if this.feasible.hides == Hides::Two {
@@ -128,7 +127,7 @@ impl<'a> Spread<'a> {
     fn deposit(&self, admit: impl Fn(&LineRow<3>) -> bool + Sync) -> Vec<f32> {
         let (grid, per_record) = (&self.grid, self.feasible.per_record);
         let sums: Vec<AtomicU32> = grid.values.iter().map(|_| AtomicU32::new(0)).collect();
-        (0..self.feasible.n_records()).into_par_iter().for_each(|record| {
+        parallel::for_each(self.feasible.n_records(), &|record| {
             let mut weights = self.weights_of(record).iter();
             for at in record * per_record..(record + 1) * per_record {
                 let line = &self.feasible.lines[at];
@@ -144,7 +143,7 @@ impl<'a> Spread<'a> {
                 }
             }
         });
-        sums.into_par_iter().map(|sum| sum.into_inner() as f32 / QUANTA).collect()
+        sums.into_iter().map(|sum| sum.into_inner() as f32 / QUANTA).collect()
     }
 }
 
@@ -209,15 +208,20 @@ impl Grid<3> {
             let place = |i: usize| self.lower(c, low[c] + (i as f32 + 0.5) * cell);
             (0..dims[c]).map(place).collect()
         });
-        finer.values.par_chunks_mut(dims[2]).enumerate().for_each(|(row, out)| {
-            let [x, y] = [places[0][row / dims[1]], places[1][row % dims[1]]];
-            for (out, &z) in out.iter_mut().zip(&places[2]) {
-                for corner in 0..8 {
-                    let (at, share) = self.corner(corner, &[x, y, z], 1.0);
-                    *out += share * self.values[at];
+        let mut rows: Vec<&mut [f32]> = finer.values.chunks_mut(dims[2]).collect();
+        parallel::for_each_mut(
+            &mut rows,
+            || (),
+            |(), row, out| {
+                let [x, y] = [places[0][row / dims[1]], places[1][row % dims[1]]];
+                for (out, &z) in out.iter_mut().zip(&places[2]) {
+                    for corner in 0..8 {
+                        let (at, share) = self.corner(corner, &[x, y, z], 1.0);
+                        *out += share * self.values[at];
+                    }
                 }
-            }
-        });
+            },
+        );
         finer
     }
 

@@ -7,11 +7,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::squared_distance;
+use crate::parallel;
 use crate::simd::{Kernel, dispatch};
 
 pub(crate) const LEAF: usize = 16;
@@ -137,13 +136,13 @@ impl<'a, const D: usize> Knn<'a, D> {
         within: impl Fn(usize) -> (usize, f64) + Sync,
         of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
     ) -> Vec<T> {
-        let value = |found: &mut Vec<_>, &row: &u32| {
-            let (row, place) = (row as usize, self.places[row as usize] as usize);
+        let value = |found: &mut Vec<_>, place: usize| {
+            let row = self.rows[place] as usize;
             self.search(self.points[row], Some(place), within(row), found);
             Some(of(row, found))
         };
         // In the order of leaves, what a query reads is cached since the one before.
-        let mut at_place: Vec<_> = self.rows.par_iter().map_init(Vec::new, value).collect();
+        let mut at_place = parallel::map_with(self.rows.len(), Vec::new, value);
         let places = self.places.iter();
         places.map(|&place| at_place[place as usize].take().expect("one row per place")).collect()
     }

@@ -2,13 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
-use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 use super::kept::{Rankings, are_equal};
 use super::rows::Rows;
 use crate::descriptors::Values;
+use crate::parallel::{self, lock};
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
@@ -115,7 +114,7 @@ impl Compared {
     fn new<L: Likeness>(likeness: &L, rows: &Rows<'_>, n_best: usize, counts: bool) -> Self {
         let (all, every) = (all_pairs(rows.len()), counts.then_some(1));
         let mut compared = compare(likeness, &rows.apart(), n_best, &all, every);
-        compared.par_iter_mut().for_each(|row| row.best.sort());
+        parallel::for_each_mut(&mut compared, || (), |(), _, row| row.best.sort());
         Self {
             name: L::NAME,
             counts,
@@ -169,7 +168,8 @@ impl Compared {
             }
             self.uncount(likeness, &absent, &own, &mut found);
         }
-        let finish = |(at, mut row): (usize, Row)| {
+        let finish = |at: usize| {
+            let mut row = found[at].clone();
             let is_full = row.best.entries.len() == self.n_best;
             let record = rows.records[at];
             let other = |(score, other): (f32, u32)| Some((score, row_of[other as usize]?));
@@ -178,7 +178,7 @@ impl Compared {
             row.best = Best { entries: others.take(n_best).collect(), ..Best::new(n_best) };
             (!is_full || row.best.entries.len() == n_best).then(|| row.found(L::STEP))
         };
-        found.into_par_iter().enumerate().map(finish).collect()
+        parallel::map(found.len(), finish).into_iter().collect()
     }
 
     fn block<L: Likeness>(&self, likeness: &L, at: impl Iterator<Item = u32>) -> L::Block {
@@ -192,8 +192,9 @@ impl Compared {
             absent.chunks(BLOCK).map(|at| (at.len(), self.block(likeness, at.iter().copied())));
         let blocks: Vec<(usize, L::Block)> = blocks.collect();
         let scratch = || vec![0.0f32; BLOCK * BLOCK];
-        let of_block = |scores: &mut Vec<f32>, (rows, own): (&mut [Row], &[u32])| {
-            let a = self.block(likeness, own.iter().copied());
+        let of_block = |scores: &mut Vec<f32>, at: usize, rows: &mut &mut [Row]| {
+            let own = own[at * BLOCK..][..rows.len()].iter().copied();
+            let a = self.block(likeness, own);
             for (n, absent) in &blocks {
                 likeness.scores(&a, absent, scores);
                 for (row, scores) in rows.iter_mut().zip(scores.chunks(BLOCK)) {
@@ -201,19 +202,22 @@ impl Compared {
                 }
             }
         };
-        rows.par_chunks_mut(BLOCK).zip(own.par_chunks(BLOCK)).for_each_init(scratch, of_block);
+        let mut rows: Vec<&mut [Row]> = rows.chunks_mut(BLOCK).collect();
+        parallel::for_each_mut(&mut rows, scratch, of_block);
     }
 
     /// Returns the scores of pairs of a row, `own` of which is its place here, with a place here.
     fn scores<L: Likeness>(&self, likeness: &L, own: &[u32], pairs: &[(u32, u32)]) -> Vec<f32> {
         let scratch = || vec![0.0f32; BLOCK * BLOCK];
-        let of_pairs = pairs.par_chunks(BLOCK).map_init(scratch, |scores, pairs| {
+        let chunks: Vec<&[(u32, u32)]> = pairs.chunks(BLOCK).collect();
+        let of_pairs = |scores: &mut Vec<f32>, at: usize| {
+            let pairs = chunks[at];
             let a = self.block(likeness, pairs.iter().map(|&(row, _)| own[row as usize]));
             let b = self.block(likeness, pairs.iter().map(|&(_, at)| at));
             likeness.scores(&a, &b, scores);
             (0..pairs.len()).map(|at| scores[at * BLOCK + at]).collect::<Vec<f32>>()
-        });
-        of_pairs.flatten_iter().collect()
+        };
+        parallel::map_with(chunks.len(), scratch, of_pairs).concat()
     }
 }
 
@@ -264,12 +268,12 @@ fn compare<L: Likeness>(
     let scratch = || (vec![0.0f32; BLOCK * BLOCK], vec![0.0f32; BLOCK * BLOCK]);
     for Tile { held, meetings } in tiles {
         let first = held.start;
-        let held: Vec<L::Block> = held.clone().into_par_iter().map(block).collect();
+        let held: Vec<L::Block> = parallel::map(held.len(), |at| block(first + at));
         if !usual.is_empty() {
-            held.par_iter().enumerate().for_each_init(scratch, |(scores, _), (at, block)| {
+            parallel::map_with(held.len(), scratch, |(scores, _), at| {
                 let a = first + at;
                 for (sample, records) in &usual {
-                    likeness.scores(block, sample, scores);
+                    likeness.scores(&held[at], sample, scores);
                     for (i, row) in lock(&kept[a]).iter_mut().enumerate() {
                         let own = rows.records[a * BLOCK + i];
                         row.count(&scores[i * BLOCK..], records, own, L::STEP);
@@ -277,37 +281,30 @@ fn compare<L: Likeness>(
                 }
             });
         }
-        meetings.par_iter().with_max_len(1).for_each_init(
-            scratch,
-            |(scores, turned), (b, with)| {
-                let b = *b as usize;
-                let made = (b < first || b - first >= held.len()).then(|| block(b));
-                let own = made.as_ref().unwrap_or_else(|| &held[b - first]);
-                for &a in with {
-                    let a = a as usize;
-                    likeness.scores(&held[a - first], own, scores);
-                    offer(a, b, scores);
-                    if a == b {
-                        continue;
-                    }
-                    for i in 0..BLOCK {
-                        for j in 0..BLOCK {
-                            turned[j * BLOCK + i] = scores[i * BLOCK + j];
-                        }
-                    }
-                    offer(b, a, turned);
+        parallel::map_with(meetings.len(), scratch, |(scores, turned), meeting| {
+            let (b, with) = &meetings[meeting];
+            let b = *b as usize;
+            let made = (b < first || b - first >= held.len()).then(|| block(b));
+            let own = made.as_ref().unwrap_or_else(|| &held[b - first]);
+            for &a in with {
+                let a = a as usize;
+                likeness.scores(&held[a - first], own, scores);
+                offer(a, b, scores);
+                if a == b {
+                    continue;
                 }
-            },
-        );
+                for i in 0..BLOCK {
+                    for j in 0..BLOCK {
+                        turned[j * BLOCK + i] = scores[i * BLOCK + j];
+                    }
+                }
+                offer(b, a, turned);
+            }
+        });
     }
     let rows =
         kept.into_iter().map(|rows| rows.into_inner().unwrap_or_else(PoisonError::into_inner));
     rows.flatten().collect()
-}
-
-/// Locks a mutex. rayon propagates a panic of another thread, so data behind a poisoned lock is never used.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[derive(Clone, Debug)]
@@ -470,15 +467,15 @@ fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
     }
     let direction = widest(descriptors, slots);
     let scratch = || vec![0.0; descriptors.dim()];
-    let product = |row: &mut Vec<f32>, &slot: &u32| {
-        descriptors.read_row(slot as usize, row);
-        (row.iter().zip(&direction).map(|(x, d)| x * d).sum(), slot)
+    let product = |row: &mut Vec<f32>, at: usize| -> (f32, u32) {
+        descriptors.read_row(slots[at] as usize, row);
+        (row.iter().zip(&direction).map(|(x, d)| x * d).sum(), slots[at])
     };
-    let mut along: Vec<(f32, u32)> = slots.par_iter().map_init(scratch, product).collect();
+    let mut along = parallel::map_with(slots.len(), scratch, product);
     // Whole blocks on the left. Equal rows stay in the order of slots.
     let left = (slots.len() / 2).next_multiple_of(BLOCK);
     let by_place = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-    along.par_sort_unstable_by(by_place);
+    along.sort_unstable_by(by_place);
     slots.iter_mut().zip(&along).for_each(|(slot, &(_, moved))| *slot = moved);
     drop(along);
     let (low, high) = slots.split_at_mut(left);
@@ -524,7 +521,7 @@ fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Error>
         }
         sum.into_iter().map(move |x| x / slots.len() as f32).collect::<Vec<f32>>()
     };
-    let values: Vec<f32> = slots.par_chunks(BLOCK).flat_map_iter(mean).collect();
+    let values: Vec<f32> = slots.chunks(BLOCK).flat_map(mean).collect();
     Descriptors::try_new(Values::F32(values), descriptors.dim())
 }
 

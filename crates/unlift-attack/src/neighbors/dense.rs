@@ -1,10 +1,9 @@
 //! Scores of all pairs of a few descriptors: the input of a network.
 
-use rayon::prelude::*;
-
 use super::compare::Likeness;
 use super::overlap::{Hypotheses, REACHES};
 use super::similarity::Cosine;
+use crate::parallel;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
@@ -28,15 +27,20 @@ pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<
     Error::check_len("dense scores", n_usual, n, " means and deviations")?;
     let mut scores = raw(descriptors);
     let usual = usual.map_or_else(|| within(&scores, n), <[_]>::to_vec);
-    scores.par_chunks_mut(n).enumerate().for_each(|(at, line)| {
-        let row = at % n;
-        for (column, score) in line.iter_mut().enumerate() {
-            // A blank descriptor has a deviation of 0.
-            let [own, others] = [usual[row], usual[column]]
-                .map(|(mean, deviation)| (f64::from(*score) - mean) / deviation.max(1e-9));
-            *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
-        }
-    });
+    let mut lines: Vec<&mut [f32]> = scores.chunks_mut(n).collect();
+    parallel::for_each_mut(
+        &mut lines,
+        || (),
+        |(), at, line| {
+            let row = at % n;
+            for (column, score) in line.iter_mut().enumerate() {
+                // A blank descriptor has a deviation of 0.
+                let [own, others] = [usual[row], usual[column]]
+                    .map(|(mean, deviation)| (f64::from(*score) - mean) / deviation.max(1e-9));
+                *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
+            }
+        },
+    );
     Ok(scores)
 }
 
@@ -78,13 +82,14 @@ fn all_pairs<L: Likeness>(
 ) -> Vec<f32> {
     let n = descriptors.len();
     let slots: Vec<u32> = (0..n as u32).collect();
-    let blocks: Vec<_> =
-        slots.par_chunks(BLOCK).map(|slots| likeness.block(descriptors, slots)).collect();
+    let block =
+        |at: usize| likeness.block(descriptors, &slots[at * BLOCK..n.min((at + 1) * BLOCK)]);
+    let blocks = parallel::map(n.div_ceil(BLOCK), block);
     let mut scores = vec![0.0f32; reaches * n * n];
     for (reach, scores) in scores.chunks_exact_mut(n * n).enumerate() {
         let scratch = || vec![0.0f32; BLOCK * BLOCK];
-        let stripes = scores.par_chunks_mut(BLOCK * n).enumerate().with_max_len(1);
-        stripes.for_each_init(scratch, |found, (a, stripe)| {
+        let mut stripes: Vec<&mut [f32]> = scores.chunks_mut(BLOCK * n).collect();
+        parallel::for_each_mut(&mut stripes, scratch, |found, a, stripe| {
             for (b, block) in blocks.iter().enumerate().skip(a) {
                 score(reach, &blocks[a], block, found);
                 let columns = b * BLOCK..n.min((b + 1) * BLOCK);
@@ -116,7 +121,7 @@ fn within(scores: &[f32], n: usize) -> Vec<(f64, f64)> {
         let mean = sum / (n - 1) as f64;
         (mean, (squares / (n - 1) as f64 - mean * mean).max(0.0).sqrt())
     };
-    (0..n).into_par_iter().map(of_row).collect()
+    parallel::map(n, of_row)
 }
 
 #[cfg(test)]

@@ -2,14 +2,13 @@
 //!
 //! Chelani et al. (CVPR 2021) list by distances between lines. Many lines pass each other closely, but few estimates are close by chance.
 
-use rayon::prelude::*;
-
 use super::Neighborhoods;
 use super::compare::higher_first;
 use super::sources::{Needs, Source};
 use crate::density::{Peaks, tomography};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{along, distance, dot, sub, widen};
+use crate::parallel;
 use crate::released::{Obfuscation, Rays, Released};
 use crate::{Error, RecordId, RowOrder};
 
@@ -106,7 +105,7 @@ pub(crate) fn geometric_by<const D: usize>(
             look *= 2;
         }
     };
-    let listed: Vec<_> = (0..positions.len()).into_par_iter().map_init(Vec::new, near).collect();
+    let listed = parallel::map_with(positions.len(), Vec::new, near);
     for (row, slot) in listed.into_iter().zip(slots) {
         rows[slot] = row;
     }

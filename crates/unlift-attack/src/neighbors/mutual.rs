@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::compare::Likeness;
 use super::similarity::{Cosine, Units};
 use crate::Descriptors;
+use crate::parallel;
 use crate::simd::{self, BLOCK, Kernel};
 
 const LANES: usize = 16;
@@ -55,8 +54,9 @@ impl Blocks {
 
 /// Returns pairs (row of `a`, row of `b`) of mutual nearest neighbors with the ratio of each side's distances, sorted.
 pub(crate) fn mutual(a: &Blocks, b: &Blocks) -> Vec<(u32, u32, f32)> {
-    let parts = a.blocks.par_chunks(ROW_BLOCKS).enumerate();
-    let found: Vec<_> = parts.map(|(at, part)| compare(a.len, at * ROW_BLOCKS, part, b)).collect();
+    let parts: Vec<_> = a.blocks.chunks(ROW_BLOCKS).collect();
+    let compare = |at: usize| compare(a.len, at * ROW_BLOCKS, parts[at], b);
+    let found = parallel::map(parts.len(), compare);
     let mut columns = vec![Nearest::NONE; b.len];
     for (_, part) in &found {
         columns.iter_mut().zip(part).for_each(|(column, part)| column.merge(part));

@@ -2,8 +2,6 @@
 
 use std::borrow::Cow;
 
-use rayon::prelude::*;
-
 use super::Neighborhoods;
 use super::kind::comparable;
 use crate::descriptors::Values;
@@ -24,9 +22,9 @@ pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
     let row = |slot: u32| slot as usize * dim..(slot as usize + 1) * dim;
     match descriptors.values() {
         Values::U8(v) => {
-            slots.par_sort_unstable_by(|&a, &b| v[row(a)].cmp(&v[row(b)]).then(a.cmp(&b)));
+            slots.sort_unstable_by(|&a, &b| v[row(a)].cmp(&v[row(b)]).then(a.cmp(&b)));
         }
-        Values::F32(v) => slots.par_sort_unstable_by(|&a, &b| {
+        Values::F32(v) => slots.sort_unstable_by(|&a, &b| {
             let unequal = v[row(a)].iter().zip(&v[row(b)]).map(|(x, y)| x.total_cmp(y));
             unequal.into_iter().find(|order| order.is_ne()).unwrap_or_else(|| a.cmp(&b))
         }),

@@ -6,8 +6,6 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
-use rayon::prelude::*;
-
 use super::compare::{Best, KeptPairs, MOST_ROWS, higher_first, search};
 use super::kept::Rankings;
 use super::overlap::Hypotheses;
@@ -15,6 +13,7 @@ use super::rows::{Ranked, Rows};
 use super::similarity::Cosine;
 use super::walk::CANDIDATES;
 use super::{Neighborhoods, overlap, walk};
+use crate::parallel;
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
@@ -62,11 +61,11 @@ pub fn scored<const D: usize>(
     };
     let without_own = |ranked: &[Ranked]| -> Vec<Ranked> {
         let record = |row: u32| rows.records[row as usize];
-        let of = |(row, ranked): (usize, &Ranked)| {
+        let of = |row: usize| -> Ranked {
             let is_other = |&&(_, other): &&(f32, u32)| record(other) != rows.records[row];
-            ranked.iter().filter(is_other).copied().collect()
+            ranked[row].iter().filter(is_other).copied().collect()
         };
-        ranked.par_iter().enumerate().map(of).collect()
+        parallel::map(ranked.len(), of)
     };
     let (mut trained, untrained) =
         (without_own(&rankings.trained), without_own(&rankings.untrained));
@@ -113,10 +112,8 @@ fn rankings(
         let usual = usual.as_ref().map(of_set);
         Part { descriptors: apart.descriptors.select(&slots), usual }
     };
-    let found: Vec<Vec<Ranked>> = sets
-        .par_iter()
-        .map(|set| within(set, scores(&part(set))?, n_best))
-        .collect::<Result<_, _>>()?;
+    let of_set = |at: usize| within(&sets[at], scores(&part(&sets[at]))?, n_best);
+    let found = parallel::map(sets.len(), of_set).into_iter().collect::<Result<Vec<_>, Error>>()?;
     let mut trained: Vec<Ranked> = vec![Vec::new(); n];
     for (set, found) in sets.iter().zip(found) {
         for (&row, pairs) in set.rows.iter().zip(found) {
@@ -126,8 +123,7 @@ fn rankings(
     let mean = |entries: &[(f32, u32)]| {
         entries.iter().map(|&(score, _)| score).sum::<f32>() / entries.len() as f32
     };
-    let trained = trained.into_par_iter().map(|entries| merged(entries, mean)).collect();
-    let trained = both_ways(trained);
+    let trained = both_ways(parallel::map(n, |row| merged(trained[row].clone(), mean)));
     let (slots, descriptors) = (apart.slots.clone(), apart.descriptors.clone().into_owned());
     rows.reorder(slots.clone());
     Ok(Rankings { descriptors, slots, n_best, untrained, trained })
@@ -139,12 +135,12 @@ fn mixed(a: &[Ranked], b: &[Ranked], n_best: usize) -> Vec<Ranked> {
         let sum: f64 = entries.iter().map(|&(log, _)| libm::exp(f64::from(log)) / 2.0).sum();
         libm::log(sum.max(f64::MIN_POSITIVE)) as f32
     };
-    let row = |(a, b): (&Ranked, &Ranked)| {
-        let mut ranked = merged([&a[..], b].concat(), mean);
+    let row = |row: usize| {
+        let mut ranked = merged([&a[row][..], &b[row]].concat(), mean);
         ranked.truncate(n_best);
         ranked
     };
-    a.par_iter().zip(b).map(row).collect()
+    parallel::map(a.len(), row)
 }
 
 /// Returns the best partners per row of a set by the mean of both rows' log probabilities.
@@ -194,16 +190,16 @@ fn both_ways(ranked: Vec<Ranked>) -> Vec<Ranked> {
     let score = |row: u32, other: u32| {
         ranked[row as usize].iter().find(|&&(_, at)| at == other).map(|&(score, _)| score)
     };
-    let row = |(row, list): (usize, &Ranked)| {
+    let row = |row: usize| {
         let shared = |&(own, other): &(f32, u32)| match score(other, row as u32) {
             Some(others) => ((own + others) / 2.0, other),
             None => (own, other),
         };
-        let mut list: Ranked = list.iter().map(shared).collect();
+        let mut list: Ranked = ranked[row].iter().map(shared).collect();
         list.sort_unstable_by(higher_first);
         list
     };
-    ranked.par_iter().enumerate().map(row).collect()
+    parallel::map(ranked.len(), row)
 }
 
 const SIZE: usize = 1024;

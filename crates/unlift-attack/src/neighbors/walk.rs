@@ -2,12 +2,11 @@
 //!
 //! The patches of two near points need not overlap, but a few steps over reliable matches lead from one to the other.
 
-use rayon::prelude::*;
-
 use super::Neighborhoods;
 use super::compare::{Best, Found, KeptPairs, Likeness, MOST_ROWS, higher_first, search};
 use super::rows::{Ranked, Rows};
 use crate::Error;
+use crate::parallel;
 use crate::released::Released;
 
 const EDGES: usize = 6;
@@ -57,36 +56,33 @@ pub fn standardized(found: &[Found]) -> Vec<Ranked> {
         ranked.sort_unstable_by(higher_first);
         ranked
     };
-    (0..found.len()).into_par_iter().map(row).collect()
+    parallel::map(found.len(), row)
 }
 
 /// Ranks at most `n_best` rows that a walk from each row reaches, then the others of `ranked`. Scores are natural logarithms.
 pub fn walk(ranked: &[Ranked], record_of: &[u32], n_best: usize, how: Walk) -> Vec<Ranked> {
     let steps = graph(ranked);
     let scratch = || Scratch { at: vec![0.0; ranked.len()], sum: vec![0.0; ranked.len()] };
-    (0..ranked.len())
-        .into_par_iter()
-        .map_init(scratch, |scratch, row| {
-            let reached = scratch.reached(&steps, row, how);
-            let mut best = Best::new(n_best);
-            for &(other, sum) in &reached {
-                if record_of[other as usize] != record_of[row] {
-                    best.push(libm::log(sum) as f32, other);
-                }
+    parallel::map_with(ranked.len(), scratch, |scratch, row| {
+        let reached = scratch.reached(&steps, row, how);
+        let mut best = Best::new(n_best);
+        for &(other, sum) in &reached {
+            if record_of[other as usize] != record_of[row] {
+                best.push(libm::log(sum) as f32, other);
             }
-            let mut list = best.into_sorted();
-            let missing = n_best - list.len();
-            // Rows that are not reached rank below all others.
-            let lowest = list.last().map_or(0.0, |&(score, _)| score);
-            let top = ranked[row].first().map_or(0.0, |&(z, _)| z);
-            let is_new = |&&(_, other): &&(f32, u32)| {
-                reached.binary_search_by_key(&other, |&(row, _)| row).is_err()
-            };
-            let rest = ranked[row].iter().filter(is_new).take(missing);
-            list.extend(rest.map(|&(z, other)| (lowest + z.min(top) - top, other)));
-            list
-        })
-        .collect()
+        }
+        let mut list = best.into_sorted();
+        let missing = n_best - list.len();
+        // Rows that are not reached rank below all others.
+        let lowest = list.last().map_or(0.0, |&(score, _)| score);
+        let top = ranked[row].first().map_or(0.0, |&(z, _)| z);
+        let is_new = |&&(_, other): &&(f32, u32)| {
+            reached.binary_search_by_key(&other, |&(row, _)| row).is_err()
+        };
+        let rest = ranked[row].iter().filter(is_new).take(missing);
+        list.extend(rest.map(|&(z, other)| (lowest + z.min(top) - top, other)));
+        list
+    })
 }
 
 /// Returns the first `n` partners of each row, and the rows that have it among theirs, with their scores, in ascending order of rows.
@@ -98,19 +94,24 @@ pub fn edges(ranked: &[Ranked], n: usize) -> Vec<Vec<(u32, f32)>> {
             edges[partner as usize].push((row as u32, score));
         }
     }
-    edges.par_iter_mut().for_each(|row| {
-        // An edge that both ends keep is one edge with the same score.
-        row.sort_unstable_by_key(|&(partner, _)| partner);
-        row.dedup_by_key(|&mut (partner, _)| partner);
-    });
+    parallel::for_each_mut(
+        &mut edges,
+        || (),
+        |(), _, row| {
+            // An edge that both ends keep is one edge with the same score.
+            row.sort_unstable_by_key(|&(partner, _)| partner);
+            row.dedup_by_key(|&mut (partner, _)| partner);
+        },
+    );
     edges
 }
 
 /// Returns the probabilities of one step, per row in ascending order of the other row.
 fn graph(ranked: &[Ranked]) -> Vec<Vec<(u32, f64)>> {
-    let step = |edges: Vec<(u32, f32)>| {
-        let mut row: Vec<(u32, f64)> =
-            edges.into_iter().map(|(partner, z)| (partner, f64::from(z))).collect();
+    let edges = edges(ranked, EDGES);
+    let step = |row: usize| {
+        let wide = edges[row].iter().map(|&(partner, z)| (partner, f64::from(z)));
+        let mut row: Vec<(u32, f64)> = wide.collect();
         let weight = |z: f64, usual: f64| libm::exp(SHARPNESS * (z - usual));
         let total = |usual: f64| row.iter().map(|&(_, z)| weight(z, usual)).sum::<f64>();
         // Rows with a deviation of 0 may have scores beyond the range of an exponential.
@@ -124,7 +125,7 @@ fn graph(ranked: &[Ranked]) -> Vec<Vec<(u32, f64)>> {
         }
         row
     };
-    edges(ranked, EDGES).into_par_iter().map(step).collect()
+    parallel::map(edges.len(), step)
 }
 
 struct Scratch {

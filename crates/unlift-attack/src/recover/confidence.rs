@@ -3,12 +3,11 @@
 //! Around a right estimate, many records that the slot lists are near, and many that list it. A logistic model turns their numbers into a
 //! probability and a scale of the error. It was fitted on synthetic maps only (docs/decisions/attack.md).
 
-use rayon::prelude::*;
-
 use crate::geometry::flatness::flatness;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::median;
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::recover::map::{Graph, Side, distance2, known, side};
 use crate::recover::result::{Confidence, Estimate, Unknown};
 use crate::released::{Obfuscation, Released};
@@ -72,9 +71,7 @@ pub(super) fn predict<const D: usize>(
         counts
     };
     let n = estimates.len();
-    let counts = |radii: f32| -> Vec<[f32; 3]> {
-        (0..n).into_par_iter().map(|slot| count(slot, radii)).collect()
-    };
+    let counts = |radii: f32| -> Vec<[f32; 3]> { parallel::map(n, |slot| count(slot, radii)) };
     // Sums of whole numbers, which are exact in any order.
     let total = |counts: &[[f32; 3]], at: usize| -> f64 {
         counts.iter().map(|count| f64::from(count[at])).sum()
@@ -119,7 +116,7 @@ pub(super) fn predict<const D: usize>(
             scale: radius[slot] * libm::expf(scale),
         }
     };
-    Ok((0..n).into_par_iter().map(of_slot).collect())
+    Ok(parallel::map(n, of_slot))
 }
 
 /// Returns the radius of every slot; the median for lost ones. `None` without estimates.
@@ -178,7 +175,7 @@ fn twins<const D: usize>(obfuscation: &Obfuscation<D>) -> f64 {
         }
         Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) => return 0.0,
     };
-    rows.par_sort_unstable();
+    rows.sort_unstable();
     let same = rows.chunk_by(|a, b| a == b).map(<[_]>::len).filter(|&n| n > 1);
     same.sum::<usize>() as f64 / rows.len().max(1) as f64
 }

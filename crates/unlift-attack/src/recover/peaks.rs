@@ -1,9 +1,8 @@
 //! Points at the peaks of densities that the records alone give.
 
-use rayon::prelude::*;
-
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::recover::map::{distance2, rows_of};
 use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
 use crate::released::Released;
@@ -74,7 +73,7 @@ pub(super) fn at_peaks<const D: usize>(
         }
         estimate
     };
-    let estimates: Vec<_> = (0..released.n_slots()).into_par_iter().map(place).collect();
+    let estimates = parallel::map(released.n_slots(), place);
     let recovered = Recovered::new(released, lists, &estimates, delta)?;
     Ok(recovered.without_confidence(Unknown::OtherSolver))
 }

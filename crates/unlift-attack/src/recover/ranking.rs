@@ -11,8 +11,6 @@
 //!
 //! Each likelihood is divided by that of a far estimate, so only those within a few `R_i` count. Eight places are scored at a time.
 
-use rayon::prelude::*;
-
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::squared_distance;
 use crate::neighbors::Neighborhoods;
@@ -95,11 +93,12 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
                 return (iteration > 0).then_some(estimates);
             }
             let entry = |&row: &u32| {
-                let (slot, radius) = (slots[row as usize], radius[slots[row as usize] as usize]);
+                let slot = slots[row as usize];
+                let radius = radius[slot as usize];
                 let inverse = if radius > 0.0 { STEEPNESS / (radius * radius) } else { 0.0 };
                 TreeEntry { x: estimates[slot as usize].position, slot, inverse }
             };
-            let entries: Vec<TreeEntry<D>> = tree.rows.par_iter().map(entry).collect();
+            let entries: Vec<TreeEntry<D>> = tree.rows.iter().map(entry).collect();
             // The chance that a wrong entry is a given record.
             let q = (1.0 - inlier_ratio) * (mean_length / n as f32);
             let context = Context {

@@ -1,9 +1,8 @@
 //! Results of recovery: estimates, confidence, and the recovered map.
 
-use rayon::prelude::*;
-
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Unit, named};
 
@@ -380,5 +379,5 @@ fn descriptor_rows<const D: usize>(
         let first = if is_straight { [a, b] } else { [b, a] };
         first.map(|row| row as u32)
     };
-    Some((0..released.n_records()).into_par_iter().flat_map_iter(rows_of).collect())
+    Some(parallel::map(released.n_records(), rows_of).concat())
 }

@@ -11,13 +11,13 @@ mod triangulate;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use rayon::prelude::*;
 use triangulate::{Fit, MISS, MOST_HYPOTHESES, Sight, triangulate};
 
 use crate::geometry::camera::Camera;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{distance, dot, median, sub, widen};
 use crate::neighbors::{Blocks, Neighborhoods, comparable, mutual};
+use crate::parallel;
 use crate::recover::{Confidence, Estimate, RecoverOptions, Recovered, Status, recover_from};
 use crate::released::{Obfuscation, Rays, Released};
 use crate::{About, Error, RowOrder, Unit};
@@ -123,7 +123,7 @@ pub fn recover(
             let enough = sights.len() >= least_views;
             (sights.len(), enough.then(|| triangulate(&sights, noise_px)).flatten())
         };
-        (0..n_slots).into_par_iter().map(of).collect()
+        parallel::map(n_slots, of)
     };
     let first = solve(FIRST_NOISE_PX, TELLING);
     let telling = first.iter().filter_map(|(_, fit)| fit.filter(|fit| fit.n_agree >= TELLING));
@@ -251,14 +251,14 @@ impl Links {
             Error::check_len(&what, rows.dim(), described[0].dim(), rule)?;
         }
         let described = comparable(&described);
-        let blocks: Vec<Blocks> = described.par_iter().map(|rows| Blocks::new(rows)).collect();
+        let blocks: Vec<Blocks> = parallel::map(described.len(), |at| Blocks::new(&described[at]));
         let toward = |query: usize| &queries[query].camera.pose.rotation[2];
         let pairs: Vec<(usize, usize)> = (0..queries.len())
             .flat_map(|a| (a + 1..queries.len().min(a + reach)).map(move |b| (a, b)))
             .filter(|&(a, b)| dot(toward(a), toward(b)) > TURNED)
             .collect();
-        let of_pair = |&(a, b): &(usize, usize)| mutual(&blocks[a], &blocks[b]);
-        let found: Vec<_> = pairs.par_iter().with_max_len(1).map(of_pair).collect();
+        let of_pair = |at: usize| mutual(&blocks[pairs[at].0], &blocks[pairs[at].1]);
+        let found = parallel::map(pairs.len(), of_pair);
         let mut links = Self::default();
         for (&(a, b), found) in pairs.iter().zip(&found) {
             for &(row, column, _) in found.iter().filter(|pair| pair.2 < RATIO * RATIO) {

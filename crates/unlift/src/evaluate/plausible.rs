@@ -1,7 +1,5 @@
 //! Plausibility checks: does data without a fingerprint belong to this map?
 
-use rayon::prelude::*;
-
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, distance, dot, median, sub, widen};
@@ -9,6 +7,7 @@ use crate::neighbors::{Neighborhoods, REAL, support};
 use crate::recover::Recovered;
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
+use unlift_attack::parallel;
 
 /// Counts the recovered positions that are nearer to their own record than to another one, half a
 /// map away. Returns this count and the number of compared positions. Without the released map,
@@ -189,7 +188,10 @@ impl<const D: usize> Truth<'_, D> {
             return (0, 0);
         }
         let places: Vec<_> = self.places().collect();
-        let meets = |&&own: &&usize| {
+        let every = records.len().div_ceil(EXAMINED).max(1);
+        let examined: Vec<usize> = (0..records.len()).step_by(every).collect();
+        let meets = |at: usize| {
+            let own = examined[at];
             let mut taken: Vec<[f64; D]> =
                 places[own * slots..][..slots].iter().map(|of| of.1).collect();
             let of_own = taken.iter().map(|x| rounding(records, own, x)).fold(0.0, f64::max);
@@ -203,9 +205,8 @@ impl<const D: usize> Truth<'_, D> {
                 is_on && taken.iter().all(|x| distance(&point, x) > APART * limit)
             })
         };
-        let every = records.len().div_ceil(EXAMINED).max(1);
-        let examined: Vec<usize> = (0..records.len()).step_by(every).collect();
-        (examined.par_iter().filter(meets).count(), examined.len())
+        let met = parallel::map(examined.len(), meets);
+        (met.into_iter().filter(|&meets| meets).count(), examined.len())
     }
 
     /// Returns whether most hidden points are off their records as by a scheme's noise: in directions

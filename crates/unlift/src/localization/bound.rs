@@ -5,9 +5,6 @@
 //! one row, along the normal of the record's image: the other direction is free. A plane gives none. The covariance is the inverse
 //! of the sum of the outer products of all rows.
 
-use nalgebra::{Matrix6, SymmetricEigen, Vector6};
-use rayon::prelude::*;
-
 use crate::geometry::camera::{Camera, PoseError};
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{cross, dot, widen};
@@ -16,6 +13,8 @@ use crate::released::{Obfuscation, Released};
 use crate::seed::{Key, Stage};
 use crate::truth::{Original, Secret};
 use crate::{Error, PointSet, Unit};
+use nalgebra::{Matrix6, SymmetricEigen, Vector6};
+use unlift_attack::parallel;
 
 /// Largest condition number of a pose that counts as determined.
 const MAX_CONDITION: f64 = 1e12;
@@ -70,10 +69,11 @@ fn unit_vector<const D: usize>(axis: usize) -> [f64; D] {
 
 /// Returns the errors of all `views` with the points themselves.
 pub fn unprotected(views: &[View], positions: &[[f64; 3]]) -> Vec<Option<PoseError>> {
-    let of = |view: &View| {
+    let of = |at: usize| {
+        let view = &views[at];
         view.pose_error(view.observed.iter().map(|&row| (positions[row as usize], None)))
     };
-    views.par_iter().map(of).collect()
+    parallel::map(views.len(), of)
 }
 
 /// Returns the errors of all `views` with a protected map and keypoints in the clear.
@@ -84,7 +84,8 @@ pub fn with_map(
     secret: &Secret,
 ) -> Vec<Option<PoseError>> {
     let free = free_directions(released, secret);
-    let of = |view: &View| {
+    let of = |at: usize| {
+        let view = &views[at];
         let known = view.observed.iter().filter_map(|&row| {
             let position = positions[row as usize];
             let direction = view.image_of(&position, &free[row as usize]?)?;
@@ -92,7 +93,7 @@ pub fn with_map(
         });
         view.pose_error(known)
     };
-    views.par_iter().map(of).collect()
+    parallel::map(views.len(), of)
 }
 
 /// Returns the errors of all `views` with a map in the clear and keypoints that `scheme` protects.
@@ -102,7 +103,8 @@ pub fn with_queries(
     scheme: &dyn Scheme<2>,
     key: &Key,
 ) -> Result<Vec<Option<PoseError>>, Error> {
-    let of = |(number, view): (usize, &View)| {
+    let of = |number: usize| {
+        let view = &views[number];
         let inside = |row: &u32| {
             let place = view.camera.project(&positions[*row as usize])?;
             let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
@@ -124,7 +126,7 @@ pub fn with_queries(
         });
         Ok(view.pose_error(known))
     };
-    views.par_iter().enumerate().map(of).collect()
+    parallel::map(views.len(), of).into_iter().collect()
 }
 
 impl View {

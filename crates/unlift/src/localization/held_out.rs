@@ -3,8 +3,6 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::cost::{FEWEST_HELD_OUT, HeldOut, Localization};
 use super::estimate::{Match, OnLine, estimate};
 use super::matches::{Pair, Unit32, mutual, with_protected};
@@ -17,6 +15,7 @@ use crate::obfuscate::{Change, Scheme, obfuscate};
 use crate::seed::{Key, Stage};
 use crate::truth::Original;
 use crate::{Descriptors, Error, PointSet, ProtectedDescriptors, Unit};
+use unlift_attack::parallel;
 
 /// A keypoint belongs to a point that its image observes if it is this near to the projection, in
 /// pixels. Right matches have the same limit.
@@ -195,7 +194,8 @@ impl<'a> Held<'a> {
     ) -> Result<Vec<Problem>, Error> {
         let mut pairs = self.pairs_in_the_clear();
         let (points, map) = self.parts();
-        let hide = |(number, query): (usize, &Query)| {
+        let hide = |number: usize| {
+            let query = &self.queries[number];
             let keypoints = PointSet::try_new(query.places.clone(), Unit::Pixel)?;
             let original = Original::within(keypoints, Bounds::try_new([0.0; 2], query.size)?)?;
             let key = key.of_item(Stage::Image, number as u64);
@@ -208,7 +208,7 @@ impl<'a> Held<'a> {
             let pairs = with_protected(&map, &protected, true).into_iter();
             Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))
         };
-        let hidden = self.queries.par_iter().enumerate().map(hide);
+        let hidden = parallel::map(self.queries.len(), hide).into_iter();
         let (free, of_protected): (Vec<Vec<Option<[f64; 2]>>>, Vec<_>) =
             hidden.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
         if let Some(own) = of_protected.into_iter().collect::<Option<Vec<_>>>() {
@@ -237,14 +237,15 @@ impl<'a> Held<'a> {
         if let Some((.., pairs)) = known {
             return Arc::clone(pairs);
         }
-        let of = |query: &Query| {
+        let of = |at: usize| -> Vec<Pair> {
+            let query = &self.queries[at];
             let matched = match &compared {
                 Compared::Plain(unit) => mutual(&query.descriptors, unit),
                 Compared::Protected(map) => with_protected(&query.descriptors, map, false),
             };
             matched.into_iter().map(|(keypoint, at)| (keypoint, rows[at])).collect()
         };
-        let pairs: Arc<Vec<Vec<Pair>>> = Arc::new(self.queries.par_iter().map(of).collect());
+        let pairs = Arc::new(parallel::map(self.queries.len(), of));
         self.known.push((rows, compared, Arc::clone(&pairs)));
         pairs
     }
@@ -323,8 +324,7 @@ impl Problem {
 
 /// Estimates the poses of all images and returns their errors; `None` without an estimate.
 pub fn locate(problems: &[Problem], seed: u64) -> Vec<Option<PoseError>> {
-    let of = |(at, problem): (usize, &Problem)| problem.solve(seed.wrapping_add(at as u64));
-    problems.par_iter().enumerate().map(of).collect()
+    parallel::map(problems.len(), |at| problems[at].solve(seed.wrapping_add(at as u64)))
 }
 
 impl HeldOut {

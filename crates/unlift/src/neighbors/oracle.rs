@@ -2,13 +2,12 @@
 //!
 //! It simulates an attacker of known quality. No other source reads ground truth.
 
-use rayon::prelude::*;
-
 use super::Neighborhoods;
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::{Original, Secret};
 use crate::{About, Error, Fingerprint, RecordId, RowOrder};
+use unlift_attack::parallel;
 
 /// The true neighborhoods of every slot: the K records nearest to its original, by (distance,
 /// original id), each once, without its own record and dropped points.
@@ -56,7 +55,8 @@ impl TrueNeighbors {
     ) -> Result<Neighborhoods, Error> {
         let keep = self.kept(inlier_ratio, outliers)?;
         let mut records = vec![RecordId(0); self.records.len()];
-        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
+        let mut rows: Vec<&mut [RecordId]> = records.chunks_mut(self.k).collect();
+        parallel::for_each_mut(&mut rows, Vec::new, |order, slot, row| {
             order.clear();
             order.extend_from_slice(self.of(slot));
             Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
@@ -114,18 +114,17 @@ impl TrueNeighbors {
         };
         let slots = self.slots_per_record;
         let either = slots == 2 && lists.about().order == RowOrder::Either;
-        let (hits, listed) = (0..lists.n_slots() / slots)
-            .into_par_iter()
-            .map(|record| {
-                let own = record * slots..(record + 1) * slots;
-                let straight: usize = own.clone().map(|slot| hits(slot, slot)).sum();
-                let crossed = match either {
-                    true => hits(own.start, own.start + 1) + hits(own.start + 1, own.start),
-                    false => 0,
-                };
-                (straight.max(crossed), own.map(|slot| lists.of(slot).len()).sum())
-            })
-            .reduce(|| (0, 0), |a: (usize, usize), b| (a.0 + b.0, a.1 + b.1));
+        let of_record = |record: usize| {
+            let own = record * slots..(record + 1) * slots;
+            let straight: usize = own.clone().map(|slot| hits(slot, slot)).sum();
+            let crossed = match either {
+                true => hits(own.start, own.start + 1) + hits(own.start + 1, own.start),
+                false => 0,
+            };
+            straight.max(crossed)
+        };
+        let hits: usize = parallel::map(lists.n_slots() / slots, of_record).iter().sum();
+        let listed = lists.records().len();
         if listed == 0 { 0.0 } else { hits as f64 / listed as f64 }
     }
 }
@@ -161,9 +160,9 @@ impl<'a, const D: usize> Nearness<'a, D> {
     fn each(&self, n: usize, rows: &mut [RecordId], make: &Make<'_>) {
         let hidden = self.secret.hidden();
         let length = (rows.len() / hidden.len().max(1)).max(1);
-        let rows = rows.par_chunks_mut(length).zip(hidden).enumerate();
-        rows.for_each_init(Default::default, |(near, records), (slot, (row, original))| {
-            self.from(original.index(), n, near, records);
+        let mut rows: Vec<&mut [RecordId]> = rows.chunks_mut(length).collect();
+        parallel::for_each_mut(&mut rows, Default::default, |(near, records), slot, row| {
+            self.from(hidden[slot].index(), n, near, records);
             make(slot, records, row);
         });
     }

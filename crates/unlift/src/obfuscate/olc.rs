@@ -2,12 +2,11 @@
 //!
 //! The size of an image is released, so a hidden keypoint lies on a chord. Scale and orientation of keypoints are not released.
 
-use rayon::prelude::*;
-
 use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::Error;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
+use unlift_attack::parallel;
 
 /// Registry entry.
 pub const ENTRY: Entry = Entry {
@@ -39,7 +38,6 @@ fn lift<const D: usize>(
 ) -> Result<Lifted<D>, Error> {
     let key = key.stage(Stage::Scheme);
     let direction = |row: usize| key.draws(row as u64).direction();
-    let rows = (0..points.positions.len()).into_par_iter();
-    let directions: Vec<[f64; D]> = rows.map(direction).collect();
+    let directions: Vec<[f64; D]> = parallel::map(points.positions.len(), direction);
     Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points.positions, &directions)?)))
 }

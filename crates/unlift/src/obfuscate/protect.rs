@@ -6,12 +6,11 @@ use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use crate::descriptors::Values;
 use crate::protected::{MOST_DIRECTIONS, ProtectedDescriptors, Rule, inner, unit_rows};
 use crate::seed::{Cipher, Draws, Key, Stage};
 use crate::{Descriptors, Error};
+use unlift_attack::parallel;
 
 /// Directions of a subspace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,8 +144,8 @@ impl Protection {
             let found = format!("{n_own} of the {n} descriptors to protect among them");
             return Err(Error::new("public descriptors", "those of other images", found));
         }
-        let of = |(row, plain): (usize, &Vec<f32>)| {
-            let mut draws = key.draws(row as u64);
+        let of = |row: usize| {
+            let (plain, mut draws) = (&plain[row], key.draws(row as u64));
             match self.rule {
                 Rule::Subspace { m } => self.subspace(m, plain, &known, &mut draws),
                 Rule::Words { m, epsilon } => {
@@ -154,7 +153,7 @@ impl Protection {
                 }
             }
         };
-        let rows: Vec<Vec<f32>> = plain.par_iter().enumerate().map(of).collect();
+        let rows: Vec<Vec<f32>> = parallel::map(n, of);
         let bytes = matches!(descriptors.values(), Values::U8(_));
         ProtectedDescriptors::try_new(self.rule, rows, self.public.clone(), bytes)
     }
@@ -265,7 +264,7 @@ fn words(rows: &[Vec<f32>], n: usize) -> Vec<Vec<f32>> {
     order.truncate(n * MAX_PER_WORD);
     let mut words: Vec<Vec<f32>> = order[..n].iter().map(|&at| rows[at].clone()).collect();
     for _ in 0..ROUNDS {
-        let of: Vec<usize> = order.par_iter().map(|&at| nearest(&rows[at], &words)).collect();
+        let of = parallel::map(order.len(), |at| nearest(&rows[order[at]], &words));
         let mut sums = vec![vec![0.0_f32; rows[0].len()]; n];
         for (&at, &word) in order.iter().zip(&of) {
             sums[word].iter_mut().zip(&rows[at]).for_each(|(sum, x)| *sum += x);

@@ -3,14 +3,13 @@
 
 use std::cmp::Ordering;
 
-use rayon::prelude::*;
-
 use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
 use crate::geometry::vector::{along, dot, squared_distance, sub, widen};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
 use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
+use unlift_attack::parallel;
 
 /// Registry entry.
 pub const ENTRY: Entry = Entry {
@@ -24,7 +23,7 @@ pub const ENTRY: Entry = Entry {
 };
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
-const RESTARTS: u64 = 10;
+const RESTARTS: usize = 10;
 /// Maximum number of iterations per restart (scikit-learn's default).
 const MAX_ROUNDS: usize = 300;
 
@@ -82,8 +81,8 @@ fn from_centers(
 
 /// Returns the centers of the best of several runs of k-means. They depend on points and `key` alone.
 fn two_centers(points: &[[f64; 3]], key: &Key) -> [[f64; 3]; 2] {
-    let run = |restart| lloyd(points, spread_start(points, key, restart));
-    let runs: Vec<_> = (0..RESTARTS).into_par_iter().map(run).collect();
+    let run = |restart: usize| lloyd(points, spread_start(points, key, restart as u64));
+    let runs = parallel::map(RESTARTS, run);
     // The first of equally good runs counts.
     let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let (_, mut centers) = best.expect("a restart");

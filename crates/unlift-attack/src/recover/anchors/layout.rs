@@ -12,15 +12,14 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use rayon::prelude::*;
-
 use crate::RecordId;
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{quantile, sub, widen};
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::recover::map::{LineRow, Listers};
 use crate::recover::result::Estimate;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 const LANDMARKS: usize = 100;
 /// Number of layouts, from other landmarks each. One may be folded where another is not.
@@ -120,7 +119,7 @@ impl Edges {
             near.dedup();
             near
         };
-        let near: Vec<Vec<u32>> = (0..n).into_par_iter().map(near).collect();
+        let near = parallel::map(n, near);
         let mean = near.iter().map(Vec::len).sum::<usize>() as f32 / n.max(1) as f32;
         let by_chance = mean * mean / n.max(1) as f32;
         let least = by_chance + LEAST_SHARED * by_chance.sqrt() + 1.0;
@@ -134,7 +133,7 @@ impl Edges {
             };
             lists.of(slot).iter().filter_map(of_record).collect()
         };
-        let shares: Vec<Vec<(u32, f32)>> = (0..n).into_par_iter().map(shared).collect();
+        let shares = parallel::map(n, shared);
         let mut sorted: Vec<f64> = shares.iter().flatten().map(|&(_, s)| f64::from(s)).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         let kept = sorted.len() as f64 / lists.records().len().max(1) as f64;
@@ -183,11 +182,12 @@ fn landmark_scaling<const D: usize>(edges: &Edges, number: usize) -> Option<Vec<
     let n = edges.of.len();
     let every = n.div_ceil(LANDMARKS).max(1);
     let landmarks: Vec<usize> = (number % every..n).step_by(every).collect();
-    let paths = landmarks.into_par_iter().map(|slot| (slot, edges.shortest_paths(slot)));
+    let of_landmark = |at: usize| (landmarks[at], edges.shortest_paths(landmarks[at]));
     let sees_most = |(_, lengths): &(usize, Vec<f32>)| {
         2 * lengths.iter().filter(|length| length.is_finite()).count() > n
     };
-    let paths: Vec<(usize, Vec<f32>)> = paths.filter(sees_most).collect();
+    let mut paths = parallel::map(landmarks.len(), of_landmark);
+    paths.retain(sees_most);
     let m = paths.len();
     if m <= D {
         return None;
@@ -363,7 +363,7 @@ impl<const D: usize> Ascent<'_, D> {
             sum * libm::exp(at[row])
         };
         let buffers = || (vec![0u8; points.len()], Vec::new());
-        Some((0..points.len()).into_par_iter().map_init(buffers, of_slot).collect())
+        Some(parallel::map_with(points.len(), buffers, of_slot))
     }
 }
 

@@ -4,9 +4,8 @@
 //! neighbors within a distance `s` of a point at range `r` are seen within an angle of `s / r`, that of the least probable window of
 //! bearings. `s` is unknown, but among rays of similar bearing those with narrow windows are likely long: ranks give ranges.
 
-use rayon::prelude::*;
-
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::recover::map::{LineRow, evenly, evidence, mixed};
 use crate::recover::result::{Estimate, Status};
 
@@ -36,7 +35,7 @@ pub(in crate::recover) fn solve<const D: usize>(
     bearings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let n = lists.n_slots();
     let windows: Vec<Option<Window>> =
-        (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
+        parallel::map(n, |slot| window(rows, &bearings, slot, lists));
     // The best of several windows has some evidence even by chance. A mean over so many has an error of a few percent.
     let sample: Vec<usize> = evenly(n, 1 << 9).collect();
     let mixed = mixed(lists, &sample, 1);
@@ -82,9 +81,10 @@ fn fractions_before<const D: usize>(
             }
             if n > 0.0 { 0.5 * (score[slot] + sum / n) } else { score[slot] }
         };
-        score = (0..rows.len()).into_par_iter().map(smooth).collect();
+        score = parallel::map(rows.len(), smooth);
     }
-    let fraction = |(at, &(group, _, slot)): (usize, &(u32, f64, u32))| {
+    let fraction = |at: usize| {
+        let (group, _, slot) = bearings[at];
         let own = score[slot as usize];
         if own.is_nan() {
             return 0.5;
@@ -102,7 +102,7 @@ fn fractions_before<const D: usize>(
         }
         below / all
     };
-    let in_order: Vec<f32> = bearings.par_iter().enumerate().map(fraction).collect();
+    let in_order = parallel::map(bearings.len(), fraction);
     let mut fractions = vec![0.5; rows.len()];
     for (&(_, _, slot), fraction) in bearings.iter().zip(in_order) {
         fractions[slot as usize] = fraction;

@@ -5,12 +5,11 @@
 //!
 //! The published programs use true points and distances. Here votes are measured from the foot, and ranges come from the votes.
 
-use rayon::prelude::*;
-
 use crate::density::Peaks;
 use crate::density::feasible::{Feasible, Hides};
 use crate::density::peaks::maxima;
 use crate::geometry::vector::median;
+use crate::parallel;
 use crate::recover::map::{LineRow, NO_GROUP, NO_VOTE};
 use crate::recover::result::Estimate;
 use crate::released::Released;
@@ -43,8 +42,7 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Option<Peaks>
         let modes = if is_paired { two_modes(&mut votes) } else { one(&mut votes) };
         (modes.map_or([None; 2], |modes| modes.map(|t| on(&lines[row], t))), reach)
     };
-    let rows: Vec<([Option<Estimate<3>>; 2], f32)> =
-        (0..lines.len()).into_par_iter().map(place).collect();
+    let rows: Vec<([Option<Estimate<3>>; 2], f32)> = parallel::map(lines.len(), place);
     let reaches = rows.iter().map(|row| f64::from(row.1));
     let mut reaches: Vec<f64> = reaches.filter(|reach| reach.is_finite()).collect();
     let resolution = if reaches.is_empty() { 0.0 } else { median(&mut reaches) };
@@ -82,7 +80,7 @@ fn refine(
         let mut votes = passes(&lines[row], chosen.iter().map(|&at| &lines[at]));
         mode(&mut votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
     };
-    (0..lines.len()).into_par_iter().map(step).collect()
+    parallel::map(lines.len(), step)
 }
 
 /// Returns the parameters at which `line` is passed most closely by `others`, except parallel ones.

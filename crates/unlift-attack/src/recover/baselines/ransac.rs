@@ -5,10 +5,9 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use rayon::prelude::*;
-
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::recover::map::{
     CandidateFamily, Family, LineFamily, NO_VOTE, PlaneFamily, Scratch, Step, solve_slots,
 };
@@ -254,7 +253,7 @@ impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
 /// are divided by their mean: otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
 fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
     let votes: Vec<AtomicU32> = (0..D * rows.len()).map(|_| AtomicU32::new(0)).collect();
-    (0..lists.n_slots()).into_par_iter().for_each(|slot| {
+    parallel::for_each(lists.n_slots(), &|slot| {
         let mut members = vec![RecordId::from_index(slot)];
         members.extend_from_slice(lists.of(slot));
         // Per axis, the sum of the distances of each member to the others, divided by the mean of these sums.

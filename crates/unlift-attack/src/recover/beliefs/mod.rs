@@ -22,10 +22,9 @@ mod temper;
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::geometry::knn::{Knn, LEAF};
 use crate::geometry::vector::widen;
+use crate::parallel;
 use crate::recover::map::{
     Candidate, Family, Piece, Step, along_curve, distance2, evenly, known, ln, solve_slots, unit,
 };
@@ -183,7 +182,8 @@ impl<const D: usize> Places<D> {
         estimates: &[Estimate<D>],
         typical: &mut Option<f32>,
     ) -> Option<Self> {
-        let (mut all, mut slot, mut offsets) = (Vec::new(), Vec::new(), vec![0]);
+        let mut all: Vec<Place<D>> = Vec::new();
+        let (mut slot, mut offsets) = (Vec::new(), vec![0]);
         for (at, belief) in beliefs.iter().enumerate() {
             all.extend(belief);
             slot.resize(all.len(), at as u32);
@@ -192,11 +192,11 @@ impl<const D: usize> Places<D> {
         let (_, best) = known(estimates);
         let tree = Knn::new(&best).ok()?;
         let k = (WIDTH_NEIGHBOR[D - 2] * best.len() / beliefs.len()).max(8) + 1;
-        let measure = |near: &mut Vec<(f64, u32)>, place: &Place<D>| {
-            tree.nearest_to(widen(&place.x), k, near);
+        let measure = |near: &mut Vec<(f64, u32)>, at: usize| {
+            tree.nearest_to(widen(&all[at].x), k, near);
             near.last().map_or(0.0, |last| last.0.sqrt() as f32)
         };
-        let mut width: Vec<f32> = all.par_iter().map_init(Vec::new, measure).collect();
+        let mut width = parallel::map_with(all.len(), Vec::new, measure);
         let firsts = offsets.windows(2).filter(|range| range[0] < range[1]);
         let mut of_best: Vec<f32> = firsts.map(|range| width[range[0] as usize]).collect();
         let middle = of_best.len() / 2;

@@ -1,8 +1,7 @@
 //! Likelihood ratios of edges by class and distance, learned from the current places by expectation maximization.
 
-use rayon::prelude::*;
-
 use super::Places;
+use crate::parallel;
 use crate::recover::map::{CHUNK, CLASSES, Family, evenly, ln};
 use crate::recover::problem::Problem;
 use crate::seed::{Draws, Stage};
@@ -64,7 +63,8 @@ impl Tables {
             }
             bins
         };
-        let by_chance: Vec<[f64; BINS]> = sample.par_chunks(CHUNK).map(by_chance).collect();
+        let parts: Vec<&[usize]> = sample.chunks(CHUNK).collect();
+        let by_chance = parallel::map(parts.len(), |at| by_chance(parts[at]));
         let mut chance = [1e-3; BINS];
         by_chance.iter().for_each(|part| add(&mut chance, part));
         let total: f64 = chance.iter().sum();
@@ -76,7 +76,7 @@ impl Tables {
             });
             edges.filter(|edge| !edge.pairs.is_empty()).collect()
         };
-        let edges: Vec<Vec<Edge>> = sample.par_chunks(CHUNK).map(edges).collect();
+        let edges = parallel::map(parts.len(), |at| edges(parts[at]));
         let near = |bin: usize| chance[bin] * (8.0 - 7.0 * bin as f64 / (BINS - 1) as f64);
         let (mut bins, passes) = match before {
             None => (vec![normalized(std::array::from_fn(near)); CLASSES], PASSES.0),
@@ -104,7 +104,7 @@ impl Tables {
                 }
                 sums
             };
-            let parts: Vec<Vec<[f64; BINS]>> = edges.par_iter().map(expected).collect();
+            let parts = parallel::map(edges.len(), |at| expected(&edges[at]));
             for (class, bins) in bins.iter_mut().enumerate() {
                 let mut sum = chance.map(|share| PRIOR * share);
                 parts.iter().for_each(|part| add(&mut sum, &part[class]));

@@ -3,9 +3,8 @@
 //! The lists of a slot say where its point is, and its record says so independently. So the temper is the exponent under which the lists,
 //! without the record, predict best where the record passes. Entries that are wrong together make it small.
 
-use rayon::prelude::*;
-
 use super::Context;
+use crate::parallel;
 use crate::recover::map::{Family, distance2, evenly, ln};
 use crate::seed::{Draws, Stage};
 
@@ -30,8 +29,7 @@ struct Named<const D: usize> {
 impl<const D: usize, F: Family<D>> Context<'_, D, F> {
     pub(super) fn learn_temper(&self) -> f32 {
         let sample: Vec<usize> = evenly(self.places.n_slots(), 2000).collect();
-        let named = sample.into_par_iter().map(|slot| self.named(slot));
-        let mut named: Vec<Vec<Named<D>>> = named.collect();
+        let mut named = parallel::map(sample.len(), |at| self.named(sample[at]));
         named.retain(|named| named.len() > 1);
         let fit = |temper: f32| -> f64 {
             let of_slot = |named: &Vec<Named<D>>| {

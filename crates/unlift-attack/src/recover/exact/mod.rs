@@ -5,8 +5,7 @@
 
 mod partners;
 
-use rayon::prelude::*;
-
+use crate::parallel;
 use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
 use partners::{LOST, Partners, Side};
@@ -110,7 +109,7 @@ fn pairs<const D: usize>(
             }
             tally
         };
-        let tallies: Vec<_> = (0..n.div_ceil(PART)).into_par_iter().map(tally).collect();
+        let tallies = parallel::map(n.div_ceil(PART), tally);
         let mut total = vec![[0.0; STEPS]; CLASSES];
         for tally in &tallies {
             let columns = total.as_flattened_mut().iter_mut().zip(tally.as_flattened());
@@ -128,7 +127,7 @@ fn pairs<const D: usize>(
         let best = likely.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
         Some(partners.of[best.1])
     };
-    let best: Vec<Option<u32>> = (0..n).into_par_iter().map(best).collect();
+    let best = parallel::map(n, best);
     let mutual = |i: usize| best[i].filter(|&j| best[j as usize] == Some(i as u32));
     (0..n).map(mutual).collect()
 }
@@ -145,7 +144,7 @@ fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) ->
     let half = 0.5 * reach;
     let sorted: [Vec<f32>; D] = std::array::from_fn(|axis| {
         let mut values: Vec<f32> = published.iter().map(|p| p[axis]).collect();
-        values.par_sort_unstable_by(f32::total_cmp);
+        values.sort_unstable_by(f32::total_cmp);
         values
     });
     let of = |side: &Side| {
@@ -156,12 +155,12 @@ fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) ->
         let to = values.partition_point(|&v| v <= side.estimate + half);
         2.0 * f64::from(half) * values.len() as f64 / (to - from + 1) as f64
     };
-    sides.par_iter().map(of).collect()
+    sides.iter().map(of).collect()
 }
 
 fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
     let mut sorted: Vec<f32> = estimates.iter().map(|e| e.evidence).collect();
-    sorted.par_sort_unstable_by(f32::total_cmp);
+    sorted.sort_unstable_by(f32::total_cmp);
     let bounds: Vec<f32> =
         (1..CLASSES).filter_map(|c| sorted.get(c * sorted.len() / CLASSES).copied()).collect();
     estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence)).collect()

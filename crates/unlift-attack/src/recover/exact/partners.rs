@@ -2,10 +2,9 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::median;
+use crate::parallel;
 use crate::recover::map::rows_mut;
 
 /// Number of nearest places in which each record looks for its partner.
@@ -50,24 +49,24 @@ impl Partners {
                 let ([a, a2], [b, b2]) = (place(a), place(b));
                 a.total_cmp(&b).then(a2.total_cmp(&b2))
             };
-            records.par_sort_by(by_place);
+            records.sort_by(by_place);
             // Of records at one place (on a floor at 0), some are enough: a search visits all that coincide.
             let equal = records.chunk_by(|a, b| place(a) == place(b));
             let searched: Vec<u32> =
                 equal.flat_map(|equal| equal.iter().take(NEAREST)).copied().collect();
             let places: Vec<[f64; 2]> = searched.iter().map(place).collect();
             let Ok(tree) = Knn::new(&places) else { continue };
-            let near = |nearest: &mut Vec<(f64, u32)>, record: &u32| {
-                let [published, estimate] = place(record);
+            let near = |nearest: &mut Vec<(f64, u32)>, at: usize| {
+                let record = records[at];
+                let [published, estimate] = place(&record);
                 tree.nearest_to([estimate, published], NEAREST, nearest);
                 let radius = nearest.get(NEAREST - 1).map_or(f64::INFINITY, |last| last.0.sqrt());
-                let pair = |&(squared, row): &(f64, u32)| {
-                    (squared.sqrt(), *record, searched[row as usize])
-                };
+                let pair =
+                    |&(squared, row): &(f64, u32)| (squared.sqrt(), record, searched[row as usize]);
                 let pairs = nearest.iter().map(pair).filter(|&(_, own, partner)| own != partner);
                 (radius, pairs.collect::<Vec<_>>())
             };
-            let rows = records.par_iter().map_init(Vec::new, near);
+            let rows = parallel::map_with(records.len(), Vec::new, near).into_iter();
             let (mut radii, rows): (Vec<f64>, Vec<Vec<_>>) = rows.unzip();
             // The largest median: on a flat map, places of one axis coincide, and those of the others do not.
             typical = typical.max(median(&mut radii));
@@ -77,7 +76,7 @@ impl Partners {
         pairs.retain(|&(distance, ..)| distance <= f64::from(reach));
         let both = pairs.into_iter().flat_map(|(_, i, j)| [(i, j), (j, i)]);
         let mut pairs: Vec<(u32, u32)> = both.collect();
-        pairs.par_sort_unstable();
+        pairs.sort_unstable();
         pairs.dedup();
         // Where all places of all axes coincide, no exact value would move a point.
         if reach <= 0.0 || pairs.is_empty() || u32::try_from(pairs.len()).is_err() {
@@ -99,8 +98,8 @@ impl Partners {
     /// Returns a value per entry; `of` writes those of one record.
     pub(super) fn column(&self, of: impl Fn(usize, &mut [f32]) + Sync) -> Vec<f32> {
         let mut column = vec![0.0; self.of.len()];
-        let rows = rows_mut(&mut column, &self.offsets);
-        rows.into_par_iter().enumerate().for_each(|(i, row)| of(i, row));
+        let mut rows = rows_mut(&mut column, &self.offsets);
+        parallel::for_each_mut(&mut rows, || (), |(), i, row| of(i, row));
         column
     }
 

@@ -23,8 +23,7 @@ mod votes;
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use rayon::prelude::*;
-
+use crate::parallel;
 use crate::recover::joint::neighbor_distribution::{Learning, REACH};
 use crate::recover::joint::update::{Context, TUBE};
 use crate::recover::map::{
@@ -116,7 +115,8 @@ pub(super) fn recover<const D: usize, F: Family<D>>(
             n_since_learning += jumped.len();
             // A jump from or to a place near the record of a neighbor may concern the neighbor.
             let reach2 = (TUBE * neighbors.radius).powi(2);
-            jumped.par_iter().with_min_len(64).for_each(|(slot, places)| {
+            parallel::for_each(jumped.len(), &|at| {
+                let (slot, places) = &jumped[at];
                 for edge in graph.of(*slot) {
                     // Both slots of a record lie on one piece.
                     if graph.slots_at(edge).any(|slot| margin[slot] > 0.0)
@@ -173,7 +173,7 @@ fn agreement<const D: usize, F: Family<D>>(
         f64::from(near) - f64::from(all) * f64::from(chance)
     };
     let slots: Vec<usize> = evenly(estimates.len(), 1 << 12).collect();
-    let parts: Vec<f64> =
-        slots.par_chunks(256).map(|part| part.iter().map(of_slot).sum()).collect();
-    parts.iter().sum::<f64>() / slots.len().max(1) as f64
+    let of_slots = parallel::map(slots.len(), |at| of_slot(&slots[at]));
+    of_slots.chunks(256).map(|part| part.iter().sum::<f64>()).sum::<f64>()
+        / slots.len().max(1) as f64
 }

@@ -3,8 +3,7 @@
 //! Edges lead to true neighbors, whose estimates lie close, and to other records. The number of close edges beyond chance gives the
 //! fraction of true neighbors in each class of edges, and their radius. Their density is modeled as proportional to `(1 + r^2 / a^2)^-3`.
 
-use rayon::prelude::*;
-
+use crate::parallel;
 use crate::recover::map::{
     CLASSES, Density, Family, Graph, Side, distance2, evenly, nearest2, side,
 };
@@ -96,15 +95,16 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
     /// Returns the learned distribution; its radius is at least `least_radius`.
     pub(super) fn distribution(&self, least_radius: f32) -> NeighborDistribution {
         let Self { problem: Problem { graph, delta, sample, .. }, reach, .. } = *self;
-        let part = |rows: &[Sampled]| {
+        // The length is fixed, so sums do not depend on the number of threads.
+        let parts: Vec<&[Sampled]> = sample.chunks(256).collect();
+        let part = |at: usize| {
             let mut tally = Tally::ZERO;
-            for row in rows.iter().filter(|row| self.estimates[row.slot].is_known()) {
+            for row in parts[at].iter().filter(|row| self.estimates[row.slot].is_known()) {
                 self.count(row, &mut tally);
             }
             tally
         };
-        // The length is fixed, so sums do not depend on the number of threads.
-        let parts: Vec<Tally> = sample.par_chunks(256).map(part).collect();
+        let parts = parallel::map(parts.len(), part);
         let mut tally = Tally::ZERO;
         parts.iter().for_each(|part| tally.merge(part));
         let [all, mutual] = [0, 1].map(|kind| tally.excess::<D>(kind));

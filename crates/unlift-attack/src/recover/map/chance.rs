@@ -3,11 +3,10 @@
 //! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`: the expected length of lines per volume, as
 //! often as each is listed, times the volume per length of a tube. A coarse grid suffices, because density varies over the size of a room.
 
-use rayon::prelude::*;
-
 use crate::RecordId;
 use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE};
 use crate::recover::map::places::{evenly, trimmed_box};
@@ -107,8 +106,8 @@ pub(crate) fn of_lines<const D: usize>(
             grid
         };
         // Eight parts for any number of threads, so that the order of sums is fixed.
-        let parts: Vec<Grid<D>> =
-            chosen.par_chunks(chosen.len().div_ceil(8).max(1)).map(lengths).collect();
+        let parts: Vec<_> = chosen.chunks(chosen.len().div_ceil(8).max(1)).collect();
+        let parts = parallel::map(parts.len(), |at| lengths(parts[at]));
         for part in &parts {
             total.values.iter_mut().zip(&part.values).for_each(|(a, b)| *a += b);
         }

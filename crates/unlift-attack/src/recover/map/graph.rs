@@ -5,10 +5,9 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::parallel;
 use crate::recover::map::places::evenly;
 
 /// Which end of an edge lists the other.
@@ -149,7 +148,7 @@ impl Graph {
             edges.extend((at..n_listed).map(|at| own(Side::Forward, at)));
             edges
         };
-        let rows: Vec<Vec<(u32, u8)>> = (0..n_slots).into_par_iter().map(edges).collect();
+        let rows = parallel::map(n_slots, edges);
         let mut offsets = vec![0];
         offsets.extend(rows.iter().scan(0, |end, row| {
             *end += row.len() as u64;

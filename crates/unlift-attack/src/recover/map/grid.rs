@@ -1,7 +1,6 @@
 //! A dense grid over the box of a map, and the density of estimates on it.
 
-use rayon::prelude::*;
-
+use crate::parallel;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::LineRow;
 use crate::recover::map::places::{sample, trimmed_box};
@@ -154,7 +153,7 @@ impl<const D: usize> Grid<D> {
             let values = &self.values;
             // Cells of one row have the same place along this axis, except along the last axis.
             let row = if stride == 1 { n } else { stride };
-            let smooth = |(number, out): (usize, &mut [f32])| {
+            let smooth = |(): &mut (), number: usize, out: &mut &mut [f32]| {
                 let start = number * row;
                 for (x, out) in out.iter_mut().enumerate() {
                     let (at, i) = (start + x, if stride == 1 { x } else { number % n });
@@ -163,7 +162,8 @@ impl<const D: usize> Grid<D> {
                     *out = 0.25 * (before + after) + 0.5 * values[at];
                 }
             };
-            out.par_chunks_mut(row).enumerate().with_min_len(64).for_each(smooth);
+            let mut rows: Vec<&mut [f32]> = out.chunks_mut(row).collect();
+            parallel::for_each_mut(&mut rows, || (), smooth);
             std::mem::swap(&mut self.values, &mut out);
             stride *= n;
         }

@@ -2,10 +2,9 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::geometry::curve;
 use crate::geometry::vector::widen;
+use crate::parallel;
 use crate::recover::result::Estimate;
 use crate::simd::{Kernel, dispatch};
 
@@ -31,8 +30,10 @@ pub(crate) trait Step: Sync {
 
 /// Runs `step` on all `slots`; returns what it returns for each.
 pub(crate) fn solve_slots<S: Step>(step: &S, slots: &[usize]) -> Vec<S::Output> {
-    let solve = |scratch: &mut S::Scratch, slots| dispatch(Chunk { step, slots, scratch });
-    slots.par_chunks(CHUNK).map_init(S::Scratch::default, solve).flatten_iter().collect()
+    let chunks: Vec<&[usize]> = slots.chunks(CHUNK).collect();
+    let solve = |scratch: &mut S::Scratch, at| dispatch(Chunk { step, slots: chunks[at], scratch });
+    let solved = parallel::map_with(chunks.len(), S::Scratch::default, solve);
+    solved.into_iter().flatten().collect()
 }
 
 struct Chunk<'a, S: Step> {
@@ -139,7 +140,7 @@ pub(crate) fn along_curve<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usiz
         });
         curve::along(&cell, BITS) << u32::BITS | slot as u64
     };
-    let mut keys: Vec<u64> = estimates.par_iter().enumerate().map(key).collect();
-    keys.par_sort_unstable();
+    let mut keys: Vec<u64> = estimates.iter().enumerate().map(key).collect();
+    keys.sort_unstable();
     keys.into_iter().map(|key| key as u32 as usize).collect()
 }
