@@ -51,9 +51,9 @@ const JOINT: &[(&str, usize, u64)] = &[
     ("ray", 3, 0x98a07ee0f5289e93),
     ("ray-voxel", 3, 0x56cb97bf6a79f352),
     ("plane", 3, 0xd381c4d257c3ca14),
-    ("cp", 3, 0xd6a646641fa150fa),
+    ("cp", 3, 0x9a373fc235e094c4),
     ("lines2d", 2, 0xd410acbf7072f145),
-    ("cp2d", 2, 0x134ef4b0b65741e2),
+    ("cp2d", 2, 0xc5ed080c1285e189),
     ("dcl2d", 2, 0x8068383fa063d5d4),
 ];
 
@@ -75,7 +75,7 @@ const SURE: &[(&str, u64)] = &[
     ("ppl", 0xcc17fb7087bc4d6e),
     ("ray", 0x102eea1e28907a18),
     ("plane", 0xe34b4c3710e00bd7),
-    ("cp", 0xbff648af1996d69b),
+    ("cp", 0x144f595c45f3811d),
 ];
 
 /// The map is large enough for confidence to be known.

@@ -35,23 +35,23 @@ pub(crate) fn settle<const D: usize>(
     // In images, delta is narrow and values are few.
     let reach = if D == 2 { 4.0 } else { 1.0 };
     let published = records.position();
-    let partners = pairs(published, &estimates, (reach * delta) as f32);
-    for (i, partner) in partners.into_iter().enumerate() {
-        if let Some(partner) = partner {
+    let values = hidden_values(published, &estimates, (reach * delta) as f32);
+    for (i, value) in values.into_iter().enumerate() {
+        if let Some(value) = value {
             let axis = usize::from(estimates[i].axis);
             estimates[i].position = published[i];
-            estimates[i].position[axis] = published[partner as usize][axis];
+            estimates[i].position[axis] = value;
         }
     }
     estimates
 }
 
-/// Returns the partner of every record, where it is known. Partners are mutual.
-fn pairs<const D: usize>(
+/// Returns the hidden value of every record, where it is known: it is published by a record whose hidden value this one publishes.
+fn hidden_values<const D: usize>(
     published: &[[f32; D]],
     estimates: &[Estimate<D>],
     reach: f32,
-) -> Vec<Option<u32>> {
+) -> Vec<Option<f32>> {
     let n = estimates.len();
     let side = |(record, estimate): (&[f32; D], &Estimate<D>)| {
         let axis = usize::from(estimate.axis);
@@ -119,16 +119,23 @@ fn pairs<const D: usize>(
     }
     // In an image, even a wrong partner is close.
     let least = if D == 2 { 0.05 } else { 0.2 };
+    let published = |e: usize| sides[partners.of[e] as usize].published;
+    // After rounding, or on a floor, many records publish one value: its probability is the sum of theirs.
     let best = |i: usize| {
-        let entries =
-            partners.entries(i).map(|e| (probability(&messages, &partners, &weight, e), e));
-        let likely = entries.filter(|&(p, _)| p >= least);
-        // Of equal ones, the first one wins.
-        let best = likely.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
-        Some(partners.of[best.1])
+        let of = |e: usize| (published(e), probability(&messages, &partners, &weight, e));
+        let mut values: Vec<(f32, f32)> = partners.entries(i).map(of).collect();
+        values.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let sum = |equal: &[(f32, f32)]| (equal[0].0, equal.iter().map(|of| of.1).sum::<f32>());
+        let values = values.chunk_by(|a, b| a.0 == b.0).map(sum).filter(|&(_, p)| p >= least);
+        values.reduce(|best, next| if next.1 > best.1 { next } else { best }).map(|best| best.0)
     };
     let best = parallel::map(n, best);
-    let mutual = |i: usize| best[i].filter(|&j| best[j as usize] == Some(i as u32));
+    let mutual = |i: usize| {
+        let value = best[i]?;
+        let own = Some(sides[i].published);
+        let is_mutual = |e: usize| published(e) == value && best[partners.of[e] as usize] == own;
+        partners.entries(i).any(is_mutual).then_some(value)
+    };
     (0..n).map(mutual).collect()
 }
 
@@ -244,5 +251,26 @@ impl Distances {
             self.weight[own] = scales.map(|s| (s + 1.0 / SCALES as f64) / (total + 1.0));
         }
         self.tabulate();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Draws, Stage};
+
+    #[test]
+    fn rounded_values_are_known_although_partners_are_not() {
+        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        let hidden: Vec<f32> = (0..2000).map(|_| draws.below(50) as f32 * 0.1).collect();
+        let published: Vec<[f32; 3]> = (0..2000).map(|i| [hidden[i ^ 1], 0.0, 0.0]).collect();
+        let estimate = |value: &f32| {
+            let near = value + 0.01 * draws.normal() as f32;
+            Estimate::at([near, 0.0, 0.0], 9, 0, 9.0)
+        };
+        let estimates: Vec<Estimate<3>> = hidden.iter().map(estimate).collect();
+        let values = hidden_values(&published, &estimates, 0.2);
+        let right = values.iter().zip(&hidden).filter(|(value, hidden)| **value == Some(**hidden));
+        assert!(right.count() > 1900);
     }
 }
