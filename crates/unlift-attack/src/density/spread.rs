@@ -113,29 +113,50 @@ impl<'a> Spread<'a> {
     /// Maximization: computes the density from the weights.
     fn maximize(&mut self) {
         self.others.clear();
-        for group in 0..self.feasible.n_groups {
-            let mut others = self.grid.clone();
-            others.values = self.deposit(|line| line.group != group as u32);
-            others.smooth(1);
-            self.others.push(others);
+        let mut all = match self.feasible.n_groups {
+            0 => self.deposit(|_| true),
+            _ => vec![0; self.grid.values.len()],
+        };
+        let of_group = |group| self.deposit(|line| line.group == group as u32);
+        let mut others: Vec<Vec<u32>> = (0..self.feasible.n_groups).map(of_group).collect();
+        if !others.is_empty() {
+            let narrow = |sum: u64| sum.min(u64::from(u32::MAX)) as u32;
+            for (voxel, all) in all.iter_mut().enumerate() {
+                let total = others.iter().map(|of_group| u64::from(of_group[voxel])).sum();
+                *all = narrow(total);
+                for sums in &mut others {
+                    sums[voxel] = narrow(total - u64::from(sums[voxel]));
+                }
+            }
         }
-        self.grid.values = self.deposit(|_| true);
-        self.grid.smooth(1);
+        self.grid.values = Vec::new();
+        let density = |sums: Vec<u32>| {
+            let mut grid = self.grid.clone();
+            grid.values = sums.into_iter().map(|sum| sum as f32 / QUANTA).collect();
+            grid.smooth(1);
+            grid
+        };
+        self.others = others.into_iter().map(density).collect();
+        self.grid = density(all);
     }
 
     /// Sums the weights of the lines that `admit` accepts, per voxel. Sums of integers depend neither on threads nor on order.
-    fn deposit(&self, admit: impl Fn(&LineRow<3>) -> bool + Sync) -> Vec<f32> {
+    fn deposit(&self, admit: impl Fn(&LineRow<3>) -> bool + Sync) -> Vec<u32> {
         let (grid, per_record) = (&self.grid, self.feasible.per_record);
         let sums: Vec<AtomicU32> = grid.values.iter().map(|_| AtomicU32::new(0)).collect();
         parallel::for_each(self.feasible.n_records(), &|record| {
-            let mut weights = self.weights_of(record).iter();
+            let mut weights = self.weights_of(record);
             for at in record * per_record..(record + 1) * per_record {
-                let line = &self.feasible.lines[at];
-                for (k, weight) in self.spans[at].clone().zip(weights.by_ref()) {
+                let (line, span) = (&self.feasible.lines[at], self.spans[at].clone());
+                let (own, rest) = weights.split_at(span.len());
+                weights = rest;
+                if !admit(line) {
+                    continue;
+                }
+                for (k, weight) in span.zip(own) {
                     let quantum = (weight * QUANTA + 0.5) as u32;
-                    if let Some(voxel) = grid.voxel(line, k)
-                        && quantum > 0
-                        && admit(line)
+                    if quantum > 0
+                        && let Some(voxel) = grid.voxel(line, k)
                     {
                         let add = |sum: u32| Some(sum.saturating_add(quantum));
                         let _ = sums[voxel].fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
@@ -143,7 +164,7 @@ impl<'a> Spread<'a> {
                 }
             }
         });
-        sums.into_iter().map(|sum| sum.into_inner() as f32 / QUANTA).collect()
+        sums.into_iter().map(AtomicU32::into_inner).collect()
     }
 }
 
