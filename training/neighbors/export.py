@@ -52,7 +52,7 @@ def main():
         dynamo=False,
     )
     model = onnx.load(options.out)
-    for key, value in about.items():
+    for key, value in sorted(about.items()):
         entry = model.metadata_props.add()
         entry.key, entry.value = key, value
     onnx.checker.check_model(model)

@@ -143,7 +143,7 @@ pub static MODELS: &[Entry] = &[
         purpose: "near points by their ALIKED descriptors (the source `learned`)",
         licence: "MIT OR Apache-2.0",
         owner: "https://github.com/unlift/unlift",
-        sha256: Some("af102cee72965b6bd486c5fbbcb573dd593b0dd54a56b04083e728ce7292c661"),
+        sha256: Some("a3b1aa593062bc02dcd0aebba45474d7063b8d8b81dd8f619b1978a58975cfe6"),
         inputs: &[
             Port { name: "descriptors", shape: &[None, Some(128)] },
             Port { name: "pairs", shape: &[Some(1), None, None] },
@@ -156,7 +156,7 @@ pub static MODELS: &[Entry] = &[
         purpose: "near points by their SIFT descriptors (the source `learned`)",
         licence: "MIT OR Apache-2.0",
         owner: "https://github.com/unlift/unlift",
-        sha256: Some("c074bdafaab15005924cc85df0eb58b6abda621e3368f4cd81f967dc7ae9b9ad"),
+        sha256: Some("4bc72d9d8bb8e982305d5a6aa8ab469f16b309f1889d61384fe2dc90845a8380"),
         inputs: &[
             Port { name: "descriptors", shape: &[None, Some(128)] },
             Port { name: "pairs", shape: &[Some(3), None, None] },
