@@ -35,8 +35,12 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Option<Peaks>
     let limit = if is_paired { 1000 } else { 500 };
     let k = limit.min((COARSE * lines.len() as f64) as usize).max(2);
     let place = |row: usize| {
-        let miss2 = |line: &LineRow<3>| section(&lines[row], line).1;
-        let (near, reach) = nearest(lines, row, every, k, |at| miss2(&lines[at]));
+        let own = &lines[row];
+        // Rays of the own center do not vote.
+        let votes = |line: &LineRow<3>| !own.is_ray() || line.group != own.group;
+        let miss2 = |line| if votes(line) { section(own, line).1 } else { f32::NAN };
+        let misses = lines.iter().step_by(every).map(miss2);
+        let (near, reach) = nearest(misses.collect(), k, (lines, row), every);
         let mut votes = passes(&lines[row], near.iter().map(|&at| &lines[at]));
         let one = |votes: &mut [f64]| mode(votes).map(|t| [t; 2]);
         let modes = if is_paired { two_modes(&mut votes) } else { one(&mut votes) };
@@ -66,11 +70,13 @@ fn refine(
     let distance2 = |line: &LineRow<3>, x: [f32; 3]| line.distance2(&x, line.along(&x));
     let step = |row: usize| {
         let estimate = estimates[row]?;
+        let points = estimates.iter().step_by(every);
         let from_own =
-            |at: usize| distance2(&lines[row], estimates[at].map_or([f32::NAN; 3], |p| p.position));
-        let (near, _) = nearest(lines, row, every, REFINE, from_own);
-        let to_estimate = |at: usize| distance2(&lines[at], estimate.position);
-        let (mut passing, _) = nearest(lines, row, every, REFINE, to_estimate);
+            points.map(|p| distance2(&lines[row], p.map_or([f32::NAN; 3], |p| p.position)));
+        let (near, _) = nearest(from_own.collect(), REFINE, (lines, row), every);
+        let to_estimate =
+            lines.iter().step_by(every).map(|line| distance2(line, estimate.position));
+        let (mut passing, _) = nearest(to_estimate.collect(), REFINE, (lines, row), every);
         passing.sort_unstable();
         let passes_too = |at: &usize| passing.binary_search(at).is_ok();
         let both: Vec<usize> = near.iter().copied().filter(passes_too).collect();
@@ -93,21 +99,20 @@ fn section(line: &LineRow<3>, passing: &LineRow<3>) -> (f32, f32, f32) {
     LineRow { group: NO_GROUP, ..*line }.section(passing)
 }
 
-/// Returns the `k` lines with the smallest finite `squared` distances among every `every`-th that may vote, and the largest of these
-/// distances.
+/// Returns the `k` voting lines with the smallest finite distances, and the largest of these. `squared` has that of every `every`-th line.
 fn nearest(
-    lines: &[LineRow<3>],
-    row: usize,
-    every: usize,
+    squared: Vec<f32>,
     k: usize,
-    squared: impl Fn(usize) -> f32,
+    (lines, row): (&[LineRow<3>], usize),
+    every: usize,
 ) -> (Vec<usize>, f32) {
     let own = &lines[row];
-    let votes = |&at: &usize| if own.is_ray() { lines[at].group != own.group } else { at != row };
-    let voting = (0..lines.len()).step_by(every).filter(votes).map(|at| (at, squared(at)));
+    let votes = |at: usize| if own.is_ray() { lines[at].group != own.group } else { at != row };
+    let voting = squared.into_iter().enumerate().map(|(number, d)| (number * every, d));
+    let voting = voting.filter(|&(at, d)| d.is_finite() && votes(at));
     // Distances are not negative, so their bits sort as they do.
-    let key = |(at, d): (usize, f32)| u64::from(d.to_bits()) << 32 | at as u64;
-    let mut keys: Vec<u64> = voting.filter(|(_, d)| d.is_finite()).map(key).collect();
+    let mut keys: Vec<u64> =
+        voting.map(|(at, d)| u64::from(d.to_bits()) << 32 | at as u64).collect();
     if keys.len() > k {
         keys.select_nth_unstable(k - 1);
         keys.truncate(k);
