@@ -113,22 +113,9 @@ impl<'a> Spread<'a> {
     /// Maximization: computes the density from the weights.
     fn maximize(&mut self) {
         self.others.clear();
-        let mut all = match self.feasible.n_groups {
-            0 => self.deposit(|_| true),
-            _ => vec![0; self.grid.values.len()],
-        };
         let of_group = |group| self.deposit(|line| line.group == group as u32);
-        let mut others: Vec<Vec<u32>> = (0..self.feasible.n_groups).map(of_group).collect();
-        if !others.is_empty() {
-            let narrow = |sum: u64| sum.min(u64::from(u32::MAX)) as u32;
-            for (voxel, all) in all.iter_mut().enumerate() {
-                let total = others.iter().map(|of_group| u64::from(of_group[voxel])).sum();
-                *all = narrow(total);
-                for sums in &mut others {
-                    sums[voxel] = narrow(total - u64::from(sums[voxel]));
-                }
-            }
-        }
+        let mut sums: Vec<Vec<u32>> = (0..self.feasible.n_groups).map(of_group).collect();
+        let all = if sums.is_empty() { self.deposit(|_| true) } else { of_others(&mut sums) };
         self.grid.values = Vec::new();
         let density = |sums: Vec<u32>| {
             let mut grid = self.grid.clone();
@@ -136,7 +123,7 @@ impl<'a> Spread<'a> {
             grid.smooth(1);
             grid
         };
-        self.others = others.into_iter().map(density).collect();
+        self.others = sums.into_iter().map(density).collect();
         self.grid = density(all);
     }
 
@@ -170,6 +157,20 @@ impl<'a> Spread<'a> {
 
 /// Units of weight per point in sums. A voxel holds up to 4,096 points; larger sums saturate.
 const QUANTA: f32 = 1_048_576.0;
+
+/// Replaces the sums of each group by those of all other groups, and returns those of all groups.
+fn of_others(groups: &mut [Vec<u32>]) -> Vec<u32> {
+    let saturated = |sum: u64| sum.min(u64::from(u32::MAX)) as u32;
+    let n_voxels = groups[0].len();
+    let of_voxel = |voxel: usize| {
+        let total: u64 = groups.iter().map(|sums| u64::from(sums[voxel])).sum();
+        for sums in groups.iter_mut() {
+            sums[voxel] = saturated(total - u64::from(sums[voxel]));
+        }
+        saturated(total)
+    };
+    (0..n_voxels).map(of_voxel).collect()
+}
 
 /// Returns the fraction of a sample's weight that smoothing leaves at the sample, and at samples one and two steps away on the line.
 fn self_kernel(line: &LineRow<3>) -> [f32; 3] {
