@@ -93,6 +93,9 @@ fn finding(results: &Results<'_>, basis: Basis, row: &Row, own: Option<f64>) -> 
     let alone = results.records_alone(&row.scheme, typed);
     let blind = row.blind_percent.get(typed).copied().unwrap_or(0.0);
     let floor = alone.map_or(0.0, |(percent, _)| percent).max(blind);
+    // The largest of several figures may be as high as the highest of their intervals.
+    let of_own = own.and_then(|_| row.recovered(typed));
+    let estimates = [row.baseline(typed), of_own].into_iter().flatten().map(|of| of.interval);
     let own = own.filter(|own| *own >= floor);
     let (by, briefly) = match (own, alone) {
         (Some(_), _) => (attack::name(row), attack::briefly(row)),
@@ -101,14 +104,13 @@ fn finding(results: &Results<'_>, basis: Basis, row: &Row, own: Option<f64>) -> 
         }
         _ => ("a blind guess".to_owned(), "a blind guess".to_owned()),
     };
-    let estimate = if own.is_some() { row.recovered(typed) } else { row.baseline(typed) };
     let recovered = own.unwrap_or(floor);
     Finding {
         basis,
         scheme: row.scheme.clone(),
         when: when(basis, row),
         recovered,
-        interval: estimate.map(|estimate| estimate.interval),
+        interval: estimates.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]),
         percent: words::percent(recovered),
         level: Level::of(recovered),
         by,
