@@ -5,7 +5,7 @@
 use indexmap::IndexMap;
 use serde::Serialize;
 use serde_json::{Value, json};
-use unlift::audit::Interval;
+use unlift::audit::{Interval, interval_of_largest};
 use unlift::recover::Builtin;
 
 use crate::attack::{self, Basis};
@@ -93,9 +93,9 @@ fn finding(results: &Results<'_>, basis: Basis, row: &Row, own: Option<f64>) -> 
     let alone = results.records_alone(&row.scheme, typed);
     let blind = row.blind_percent.get(typed).copied().unwrap_or(0.0);
     let floor = alone.map_or(0.0, |(percent, _)| percent).max(blind);
-    // The largest of several figures may be as high as the highest of their intervals.
-    let of_own = own.and_then(|_| row.recovered(typed));
-    let estimates = [row.baseline(typed), of_own].into_iter().flatten().map(|of| of.interval);
+    // A baseline may recover more than the attack whose interval reaches higher.
+    let of_attack = own.and_then(|_| row.recovered(typed));
+    let estimates = [row.baseline(typed), of_attack].into_iter().flatten();
     let own = own.filter(|own| *own >= floor);
     let (by, briefly) = match (own, alone) {
         (Some(_), _) => (attack::name(row), attack::briefly(row)),
@@ -110,7 +110,7 @@ fn finding(results: &Results<'_>, basis: Basis, row: &Row, own: Option<f64>) -> 
         scheme: row.scheme.clone(),
         when: when(basis, row),
         recovered,
-        interval: estimates.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]),
+        interval: interval_of_largest(estimates.map(|of| of.interval)),
         percent: words::percent(recovered),
         level: Level::of(recovered),
         by,

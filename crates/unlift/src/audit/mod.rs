@@ -29,4 +29,6 @@ pub use row::{
     Alone, ByReason, Distinct, Intervals, PERCENTILES, Parts, ReliabilityBin, Row, Spread, measure,
 };
 pub use run::{Outcome, run, run_released, scheme_called};
-pub use share::{ByThreshold, Interval, Share, Shares, Threshold, WithInterval};
+pub use share::{
+    ByThreshold, Interval, Share, Shares, Threshold, WithInterval, interval_of_largest,
+};

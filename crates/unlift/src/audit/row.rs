@@ -6,8 +6,8 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::share::{
-    ByThreshold, Interval, Share, Shares, Threshold, WithInterval, intervals, over_repeats,
-    percents, shares,
+    ByThreshold, Interval, Share, Shares, Threshold, WithInterval, interval_of_largest, intervals,
+    over_repeats, percents, shares,
 };
 use crate::evaluate::{Accuracy, Bin, Reliability, evaluate, exchanged_percent, reliability};
 use crate::recover::Recovered;
@@ -245,8 +245,7 @@ impl Row {
     pub fn baseline(&self, threshold: &str) -> Option<WithInterval> {
         let of = self.interval.as_ref()?;
         let both = [of.blind_percent.get(threshold), of.records_alone_percent.get(threshold)];
-        let interval =
-            both.into_iter().flatten().copied().reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])?;
+        let interval = interval_of_largest(both.into_iter().flatten().copied())?;
         Some(WithInterval { percent: self.baseline_percent(threshold)?, interval })
     }
 

@@ -34,6 +34,11 @@ pub type ByThreshold = IndexMap<String, f64>;
 /// Ends of a 95 % interval, in percent.
 pub type Interval = [f64; 2];
 
+/// Returns the interval of the largest of several figures, which may be as high as the highest of theirs. `None` without figures.
+pub fn interval_of_largest(intervals: impl IntoIterator<Item = Interval>) -> Option<Interval> {
+    intervals.into_iter().reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+}
+
 /// A percentage with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WithInterval {
