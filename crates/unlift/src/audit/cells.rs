@@ -23,7 +23,6 @@ use crate::{Descriptors, Error, ErrorKind, recover};
 const RATIO_AT_K: &str = "inlier_ratio_at_k";
 
 /// A map or an image with its ground truth.
-#[derive(Clone, Copy)]
 pub(super) struct Owned<'a, const D: usize> {
     pub(super) original: &'a Original<D>,
     pub(super) descriptors: Option<&'a Descriptors>,
@@ -42,6 +41,7 @@ impl<const D: usize> Owned<'_, D> {
 
 /// Scheme, repeat and randomness of a group of rows, and what all groups of an item share.
 struct Run<'a, const D: usize> {
+    owned: &'a Owned<'a, D>,
     plan: &'a Plan<D>,
     search: &'a Knn<'a, D>,
     /// Lists that do not depend on the scheme.
@@ -68,7 +68,6 @@ pub(super) struct Finished<'a> {
     pub(super) whole: Vec<String>,
     /// Number of entries of all lists.
     pub(super) n_listed: usize,
-    pub(super) seconds: RowSeconds,
 }
 
 /// Progress of an item, in units of the cost of one recovery.
@@ -82,14 +81,6 @@ impl<const D: usize> Progress<'_, D> {
     fn begin(&mut self, what: &str) {
         self.observer.progress(self.done, self.total, what);
     }
-
-    fn check_stop(&self) -> Result<(), Error> {
-        if self.observer.goes_on() {
-            return Ok(());
-        }
-        let error = Error::new("audit", "to run to the end", "a request to stop");
-        Err(error.of_kind(ErrorKind::Stopped))
-    }
 }
 
 /// Typical cost in recoveries of the attacks on the records alone, and of the lists of one source.
@@ -102,20 +93,30 @@ const COST: usize = 4;
 /// For images, whose rows are pooled, any failure of a scheme, source or solver. For maps, failures of
 /// built-in solvers and of measures only. Also when the observer stops the audit.
 fn cells<const D: usize>(
-    owned: &Owned<'_, D>,
     run: &Run<'_, D>,
     clock: &mut Seconds,
     progress: &mut Progress<'_, D>,
-    each: &mut dyn FnMut(Finished<'_>),
+    each: &mut dyn FnMut(Finished<'_>, RowSeconds),
 ) -> Result<Vec<NotAudited>, Error> {
-    let (plan, scheme) = (run.plan, run.scheme.name());
-    let hidden = match clock.time(|s| &mut s.obfuscate, || hide(owned, run)) {
+    let (owned, plan, scheme) = (run.owned, run.plan, run.scheme.name());
+    let hidden = match clock.time(|s| &mut s.obfuscate, || hide(run)) {
         Err(error) if !owned.may_be_small() => {
             return Ok(vec![NotAudited::new(scheme, None, error)]);
         }
         hidden => hidden.map_err(|error| error.within(scheme))?,
     };
-    let release = Release::new((owned, run), &hidden, clock, progress)?;
+    let (released, secret) = &*hidden;
+    let guess = || blind(released, owned.original, secret);
+    let baseline = clock.time(|s| &mut s.evaluate, guess);
+    // In the plane all lines meet, so records alone contain no information.
+    let mut alone = Vec::new();
+    if plan.records_alone && D == 3 {
+        progress.begin(&format!("{scheme}, records alone"));
+        let attack = || records_alone(&hidden, owned.original, plan, run.seed);
+        alone = clock.time(|s| &mut s.records_alone, attack)?;
+        progress.done += COST;
+    }
+    let release = Release { run, released, secret, baseline, alone };
     let seeds = (run.oracle_seed, run.seed);
     let mut sources = Lists::new(plan.k, run.search, &hidden, seeds, run.kept);
     let options = RecoverOptions { seed: run.seed, ..RecoverOptions::default() };
@@ -127,7 +128,7 @@ fn cells<const D: usize>(
         let make = || sources.make(variant, owned.may_be_small());
         let made = match clock.time(|s| &mut s.neighbors, make) {
             Err(error) if !owned.may_be_small() => {
-                missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
+                missing.push(NotAudited::variant(scheme, variant, &error, secret));
                 continue;
             }
             made => made.map_err(|error| error.within(scheme))?,
@@ -137,14 +138,17 @@ fn cells<const D: usize>(
             progress.done += COST;
         }
         for (at, solver) in plan.solvers.iter().enumerate() {
-            progress.check_stop()?;
+            if !progress.observer.goes_on() {
+                let error = Error::new("audit", "to run to the end", "a request to stop");
+                return Err(error.of_kind(ErrorKind::Stopped));
+            }
             progress.begin(&format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name()));
             let started = Instant::now();
-            let recovered = match recover(&hidden.0, &made.lists, &**solver, &options) {
+            let recovered = match recover(released, &made.lists, &**solver, &options) {
                 // The failure of a custom solver costs only its own rows.
                 Err(error) if solver.builtin().is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));
-                    missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
+                    missing.push(NotAudited::variant(scheme, variant, &error, secret));
                     continue;
                 }
                 recovered => recovered?,
@@ -157,29 +161,26 @@ fn cells<const D: usize>(
             let finished = clock.time(|s| &mut s.evaluate, evaluate)?;
             progress.observer.cell(&release.cell(&finished, &made, &recovered));
             progress.done += 1;
-            each(Finished { seconds, ..finished });
+            each(finished, seconds);
         }
     }
     Ok(missing)
 }
 
 /// Hides the points under the scheme of `run` and checks the result, or returns what was given.
-fn hide<'a, const D: usize>(
-    owned: &Owned<'a, D>,
-    run: &Run<'_, D>,
-) -> Result<Cow<'a, (Released<D>, Secret)>, Error> {
+fn hide<'a, const D: usize>(run: &Run<'a, D>) -> Result<Cow<'a, (Released<D>, Secret)>, Error> {
+    let Owned { original, descriptors, hidden, .. } = *run.owned;
     let is_given = run.scheme.name() == run.plan.schemes[0].name();
-    if let Some(given) = owned.hidden.filter(|_| is_given) {
+    if let Some(given) = hidden.filter(|_| is_given) {
         return Ok(Cow::Borrowed(given));
     }
-    let hidden = obfuscate(run.scheme, owned.original, owned.descriptors, &run.key)?;
-    check_laws(run.scheme, owned.original, &run.key, (&hidden.0, &hidden.1))?;
+    let hidden = obfuscate(run.scheme, original, descriptors, &run.key)?;
+    check_laws(run.scheme, original, &run.key, (&hidden.0, &hidden.1))?;
     Ok(Cow::Owned(hidden))
 }
 
 /// The release of an item under one scheme, with what all its rows share.
 struct Release<'a, const D: usize> {
-    owned: &'a Owned<'a, D>,
     run: &'a Run<'a, D>,
     released: &'a Released<D>,
     secret: &'a Secret,
@@ -189,27 +190,7 @@ struct Release<'a, const D: usize> {
     alone: Vec<Alone>,
 }
 
-impl<'a, const D: usize> Release<'a, D> {
-    fn new(
-        (owned, run): (&'a Owned<'a, D>, &'a Run<'a, D>),
-        hidden: &'a (Released<D>, Secret),
-        clock: &mut Seconds,
-        progress: &mut Progress<'_, D>,
-    ) -> Result<Self, Error> {
-        let (released, secret) = hidden;
-        let guess = || blind(released, owned.original, secret);
-        let baseline = clock.time(|s| &mut s.evaluate, guess);
-        // In the plane all lines meet, so records alone contain no information.
-        let mut alone = Vec::new();
-        if run.plan.records_alone && D == 3 {
-            progress.begin(&format!("{}, records alone", run.scheme.name()));
-            let attack = || records_alone(hidden, owned.original, run.plan, run.seed);
-            alone = clock.time(|s| &mut s.records_alone, attack)?;
-            progress.done += COST;
-        }
-        Ok(Self { owned, run, released, secret, baseline, alone })
-    }
-
+impl<const D: usize> Release<'_, D> {
     /// Evaluates what `solver` recovered from the lists `made`, with the measures of the plan.
     fn evaluate(
         &self,
@@ -217,7 +198,7 @@ impl<'a, const D: usize> Release<'a, D> {
         solver: &dyn Solver<D>,
         recovered: &Recovered<D>,
     ) -> Result<Finished<'_>, Error> {
-        let (original, plan) = (self.owned.original, self.run.plan);
+        let (original, plan) = (self.run.owned.original, self.run.plan);
         let (measured, accuracy) =
             measure(recovered, original, self.secret, Some(&self.baseline), &plan.thresholds)?;
         let secret = joined(recovered, original, self.secret);
@@ -236,14 +217,13 @@ impl<'a, const D: usize> Release<'a, D> {
         row.metrics.extend(truth.bearings(&made.lists));
         row.metrics.extend(truth.off_record());
         let mut weights = Vec::new();
-        if self.owned.may_be_small() {
+        if self.run.owned.may_be_small() {
             weights = distinct_weights(original, &secret);
             row.fill_distinct(&accuracy, &self.baseline, &weights, &plan.thresholds);
         }
-        let (baseline, whole, seconds) = (&self.baseline, Vec::new(), RowSeconds::default());
+        let (baseline, whole) = (&self.baseline, Vec::new());
         let n_listed = made.lists.records().len();
-        let mut finished =
-            Finished { row, accuracy, baseline, secret, weights, whole, n_listed, seconds };
+        let mut finished = Finished { row, accuracy, baseline, secret, weights, whole, n_listed };
         let mut metrics = Vec::new();
         for measure in &plan.measures {
             let measured = measure.measure(&self.cell(&finished, made, recovered))?;
@@ -263,7 +243,7 @@ impl<'a, const D: usize> Release<'a, D> {
         recovered: &'c Recovered<D>,
     ) -> Cell<'c, D> {
         let Finished { row, accuracy, secret, .. } = finished;
-        let Owned { name, original, descriptors, .. } = *self.owned;
+        let Owned { name, original, descriptors, .. } = *self.run.owned;
         let (repeat, released, lists) = (self.run.repeat, self.released, &made.lists);
         Cell {
             name,
@@ -339,13 +319,13 @@ pub(super) fn of_item<const D: usize>(
                 Some(name) => (key_of(&key, name), oracle_seed(seed, name)),
             };
             let scheme = &**scheme;
-            let run = Run { plan, search, kept, scheme, repeat, key, oracle_seed, seed };
+            let run = Run { owned, plan, search, kept, scheme, repeat, key, oracle_seed, seed };
             let (mut of_repeat, before) = (Vec::new(), progress.done);
-            let mut each = |row: Finished<'_>| {
+            let mut each = |row: Finished<'_>, seconds: RowSeconds| {
                 finished(&row);
-                of_repeat.push((row.row, row.seconds));
+                of_repeat.push((row.row, seconds));
             };
-            let lacking = cells(owned, &run, clock, &mut progress, &mut each)?;
+            let lacking = cells(&run, clock, &mut progress, &mut each)?;
             progress.done = before + per_scheme;
             by_repeat.push(of_repeat);
             add_new(&mut missing, lacking);

@@ -178,12 +178,10 @@ impl<'a, const D: usize> Lists<'a, D> {
     fn near(&mut self, k: usize, by_row: bool) -> Result<&TrueNeighbors, Error> {
         // With one slot per record the two orders are equal.
         let by_row = by_row && self.secret.slots_per_record() > 1;
-        match self.near.entry((k, by_row)) {
-            Entry::Occupied(near) => Ok(near.into_mut()),
-            Entry::Vacant(near) => {
-                let secret = if by_row { &self.by_row } else { self.secret };
-                Ok(near.insert(TrueNeighbors::new(self.search, secret, k)?))
-            }
+        if let Entry::Vacant(near) = self.near.entry((k, by_row)) {
+            let secret = if by_row { &self.by_row } else { self.secret };
+            near.insert(TrueNeighbors::new(self.search, secret, k)?);
         }
+        Ok(&self.near[&(k, by_row)])
     }
 }

@@ -10,10 +10,10 @@ use super::clock::{RowSeconds, Seconds};
 use super::missing::{NotAudited, add_new};
 use super::observer::{Observer, Silent};
 use super::plan::Plan;
-use super::row::{Alone, ByReason, Distinct, Parts, Row, places_within, within};
+use super::row::{Alone, Distinct, Parts, Row, places_within, within};
 use super::run::Outcome;
-use super::share::{Shares, Threshold, merge};
-use crate::evaluate::{Accuracy, Reliability};
+use super::share::{Shares, Threshold};
+use crate::evaluate::Accuracy;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -164,7 +164,14 @@ fn sums_of<const D: usize>(
         observer.progress(1, 1, "done");
         return Ok((Vec::new(), sums));
     }
-    check(item, plan)?;
+    // What `Plan::check_for_many` cannot check.
+    if D == 3 {
+        plan.check(item.original.len(), item.descriptors.is_some())?;
+    } else if item.original.bounds().is_none() {
+        return Err(Error::new("image size", "known", "none"));
+    } else if item.descriptors.is_none() {
+        plan.without_descriptors()?;
+    }
     let (original, descriptors) = (&item.original, item.descriptors.as_ref());
     let owned = Owned { original, descriptors, hidden: None, name: Some(&item.name) };
     let mut all_pools: Vec<Vec<Pool>> = Vec::new();
@@ -188,17 +195,6 @@ fn sums_of<const D: usize>(
     Ok((rows, sums))
 }
 
-/// Checks an item for conditions that [`Plan::check_for_many`] cannot check.
-fn check<const D: usize>(item: &Item<D>, plan: &Plan<D>) -> Result<(), Error> {
-    if D == 2 && item.original.bounds().is_none() {
-        return Err(Error::new("image size", "known", "none"));
-    }
-    if D == 3 {
-        return plan.check(item.original.len(), item.descriptors.is_some());
-    }
-    if item.descriptors.is_some() { Ok(()) } else { plan.without_descriptors() }
-}
-
 /// Bits of the mantissa of an `f32` that the histogram of errors ignores: bins are 0.05 % wide.
 const DROPPED_BITS: u32 = 12;
 
@@ -214,21 +210,16 @@ struct Figure {
 /// Sums over images. Shares are computed at the end, so rounding errors do not add up.
 #[derive(Debug)]
 pub(super) struct Pool {
-    /// Row of the first image, which identifies the cell.
+    /// Row of the first image, which identifies the cell. Its numbers of points and its reliability are those of all images.
     cell: Row,
-    n_points: usize,
     /// Sums by figure: of entries and true entries of lists, of percentages times points. A figure that no image has is absent.
     sums: BTreeMap<&'static str, f64>,
     /// Points and distinct places within each threshold.
     shares: SharesByName,
     metrics: BTreeMap<String, Figure>,
-    lost: ByReason,
-    dropped: ByReason,
     trials: BTreeMap<u32, u64>,
     /// Shares of each attack on the records alone.
     alone: SharesByName,
-    reliability: Option<Reliability>,
-    sure_unknown: Option<String>,
     errors: Errors,
     blind_errors: Errors,
 }
@@ -243,19 +234,15 @@ impl Pool {
         let Finished { row, accuracy, baseline, weights, whole, n_listed, .. } = finished;
         let n = accuracy.n_points();
         let percentage = |percent: Option<f64>| percent.map(|percent| percent * n as f64);
-        let mut sums = BTreeMap::from([
-            ("delta", row.delta * n as f64),
-            ("listed", *n_listed as f64),
-            ("hits", row.inlier_ratio * *n_listed as f64),
-            ("places", weights.iter().sum()),
-        ]);
-        for (name, sum) in [
+        let sums = [
+            ("delta", Some(row.delta * n as f64)),
+            ("listed", Some(*n_listed as f64)),
+            ("hits", Some(row.inlier_ratio * *n_listed as f64)),
+            ("places", Some(weights.iter().sum())),
             ("exact", accuracy.n_exact.map(|n_exact| n_exact as f64)),
             ("axis", percentage(row.axis_accuracy_percent)),
             ("assignment", percentage(row.assignment_accuracy_percent)),
-        ] {
-            sums.extend(sum.map(|sum| (name, sum)));
-        }
+        ];
         let figure = |(name, value): (&String, &f64)| {
             let of_images = whole.contains(name);
             let known = if of_images { 1 } else { n };
@@ -263,8 +250,7 @@ impl Pool {
         };
         Self {
             cell: row.clone(),
-            n_points: n,
-            sums,
+            sums: sums.into_iter().filter_map(|(name, sum)| Some((name, sum?))).collect(),
             shares: BTreeMap::from([
                 ("recovered", within(accuracy, thresholds)),
                 ("blind", within(baseline, thresholds)),
@@ -272,12 +258,8 @@ impl Pool {
                 ("blind places", places_within(baseline, weights, thresholds)),
             ]),
             metrics: row.metrics.iter().map(figure).collect(),
-            lost: row.lost.clone(),
-            dropped: row.dropped.clone(),
             trials: row.ransac_trials.iter().flatten().copied().collect(),
             alone: row.parts.alone.iter().map(|of| (of.name, of.shares.clone())).collect(),
-            reliability: row.parts.reliability.clone(),
-            sure_unknown: row.sure_unknown.clone(),
             errors: Errors::of(accuracy),
             blind_errors: Errors::of(baseline),
         }
@@ -285,7 +267,15 @@ impl Pool {
 
     /// Adds the sums of `more`, a pool of the same row.
     pub(super) fn merge(&mut self, more: &Self) {
-        self.n_points += more.n_points;
+        let (all, of_more) = (&mut self.cell, &more.cell);
+        all.n_points += of_more.n_points;
+        merge_counts(&mut all.lost, &of_more.lost);
+        merge_counts(&mut all.dropped, &of_more.dropped);
+        if let (Some(all), Some(more)) = (&mut all.parts.reliability, &of_more.parts.reliability) {
+            all.merge(more);
+        }
+        // Confidence counts only if it is known for all items.
+        all.sure_unknown = all.sure_unknown.take().or_else(|| of_more.sure_unknown.clone());
         merge_counts(&mut self.sums, &more.sums);
         merge_shares(&mut self.shares, &more.shares);
         merge_shares(&mut self.alone, &more.alone);
@@ -295,24 +285,18 @@ impl Pool {
             figure.known += more.known;
             figure.of_images = more.of_images;
         }
-        if let (Some(all), Some(more)) = (&mut self.reliability, &more.reliability) {
-            all.merge(more);
-        }
-        // Confidence counts only if it is known for all items.
-        self.sure_unknown = self.sure_unknown.take().or_else(|| more.sure_unknown.clone());
-        merge_counts(&mut self.lost, &more.lost);
-        merge_counts(&mut self.dropped, &more.dropped);
         merge_counts(&mut self.trials, &more.trials);
         merge_counts(&mut self.errors.0, &more.errors.0);
         merge_counts(&mut self.blind_errors.0, &more.blind_errors.0);
     }
 
     pub(super) fn row(&self) -> Row {
-        let n = self.n_points.max(1) as f64;
+        let Row { n_points, parts, sure_unknown, .. } = &self.cell;
+        let n = (*n_points).max(1) as f64;
         let sum = |name| self.sums.get(name).copied();
         let total = |name| sum(name).unwrap_or(0.0);
         let is_known =
-            |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == self.n_points;
+            |(_, figure): &(&String, &Figure)| figure.of_images || figure.known == *n_points;
         let alone = |(&name, shares): (&&'static str, &Shares)| {
             // An attack that cannot run on an item recovers nothing there.
             let of_all = shares.iter().map(|(label, share)| (label.clone(), share.among(n)));
@@ -325,10 +309,7 @@ impl Pool {
                 _ => self.cell.inlier_ratio,
             },
             delta: total("delta") / n,
-            n_points: self.n_points,
-            n_lost: self.lost.values().sum(),
-            lost: self.lost.clone(),
-            dropped: self.dropped.clone(),
+            n_lost: self.cell.lost.values().sum(),
             axis_accuracy_percent: sum("axis").map(|sum| sum / n),
             exact_percent: sum("exact").map(|exact| 100.0 * exact / n),
             metrics: self
@@ -337,22 +318,21 @@ impl Pool {
                 .filter(is_known)
                 .map(|(name, figure)| (name.clone(), figure.sum / figure.known.max(1) as f64))
                 .collect(),
-            blind_median_error: self.blind_errors.percentile(50.0, self.n_points),
+            blind_median_error: self.blind_errors.percentile(50.0, *n_points),
             ransac_trials: (self.cell.ransac_trials.is_some() || !self.trials.is_empty())
                 .then(|| self.trials.iter().map(|(&up_to, &slots)| (up_to, slots)).collect()),
             parts: Parts {
                 alone: self.alone.iter().map(alone).collect(),
-                reliability: self.reliability.clone().filter(|_| self.sure_unknown.is_none()),
+                reliability: parts.reliability.clone().filter(|_| sure_unknown.is_none()),
             },
             assignment_accuracy_percent: sum("assignment").map(|sum| sum / n),
-            sure_unknown: self.sure_unknown.clone(),
             distinct: self.cell.distinct.as_ref().map(|_| {
                 Distinct::of(total("places"), &self.shares["places"], &self.shares["blind places"])
             }),
             ..self.cell.clone()
         };
         row.fill_shares(&self.shares["recovered"], &self.shares["blind"]);
-        row.fill_errors(|p| self.errors.percentile(p, self.n_points));
+        row.fill_errors(|p| self.errors.percentile(p, *n_points));
         row.summarize();
         row
     }
@@ -391,7 +371,8 @@ type SharesByName = BTreeMap<&'static str, Shares>;
 
 fn merge_shares(to: &mut SharesByName, more: &SharesByName) {
     for (name, more) in more {
-        merge(to.entry(name).or_default(), more);
+        let to = to.entry(name).or_default();
+        more.iter().for_each(|(label, more)| to.entry(label.clone()).or_default().merge(more));
     }
 }
 

@@ -29,16 +29,13 @@ pub fn read_from_file(
     thresholds: &[Threshold],
 ) -> Option<Alone> {
     let slots = secret.slots_per_record();
-    let point = |slot: usize| &original.reveal().positions()[secret.hidden()[slot].index()];
+    let points = original.reveal().positions();
+    let point = |slot: usize| &points[secret.hidden()[slot].index()];
     let fixed = match published {
         [from, to] if slots == 1 => at_fixed_distances(from, to, point).to_vec(),
         _ => Vec::new(),
     };
-    let columns: Vec<&[Vec<[f64; 3]>]> = match slots {
-        1 => published.chunks(1).collect(),
-        _ => vec![published],
-    };
-    let points = original.reveal().positions();
+    let columns = published.chunks(if slots == 1 { 1 } else { published.len().max(1) });
     let largest = points.iter().flatten().fold(across(points), |most, x| most.max(x.abs()));
     let least = least(thresholds);
     let rounding = (ROUNDING * largest).min(least);
@@ -56,7 +53,7 @@ pub fn read_from_file(
         (0..secret.n_slots()).filter(is_near).count()
     };
     let is_rule = |of: &&[Vec<[f64; 3]>]| within(of, least) as f64 > MOST * secret.n_slots() as f64;
-    let columns: Vec<_> = columns.iter().copied().chain(fixed.chunks(1).filter(is_rule)).collect();
+    let columns: Vec<_> = columns.chain(fixed.chunks(1).filter(is_rule)).collect();
     let best = |t: &Threshold| {
         let n = columns.iter().map(|of| within(of, t.value)).max().unwrap_or(0);
         (t.label.clone(), Share::of(n as f64, secret.n_slots() as f64))
@@ -120,15 +117,13 @@ fn columns(rows: &Descriptors, secret: &Secret, points: &[[f64; 3]]) -> Vec<Stri
     if (slots.len() as f64) < FEWEST {
         return Vec::new();
     }
-    let (mut values, mut row) = (vec![Vec::new(); rows.dim()], vec![0.0; rows.dim()]);
-    for slot in slots.clone() {
-        rows.read_row(secret.descriptor_row()[slot] as usize, &mut row);
-        values.iter_mut().zip(&row).for_each(|(column, &value)| column.push(f64::from(value)));
-    }
+    let sample: Vec<u32> = slots.clone().map(|slot| secret.descriptor_row()[slot]).collect();
+    let sample: Vec<Vec<f32>> = rows.select(&sample).rows().collect();
     let places: [Vec<f64>; 3] =
         [0, 1, 2].map(|c| slots.clone().map(|s| points[secret.hidden()[s].index()][c]).collect());
     let doubt = |at: usize| {
-        let of = |axis: usize| (axis, correlation(&values[at], &places[axis]));
+        let values: Vec<f64> = sample.iter().map(|row| f64::from(row[at])).collect();
+        let of = |axis: usize| (axis, correlation(&values, &places[axis]));
         let (axis, r) = (0..3).map(of).find(|(_, r)| r.abs() > FOLLOWS)?;
         Some(format!(
             "descriptors: column {at} (from 0) follows the coordinate {} (correlation {r:.2}), which no attack here reads: \
@@ -136,7 +131,7 @@ fn columns(rows: &Descriptors, secret: &Secret, points: &[[f64; 3]]) -> Vec<Stri
             ["x", "y", "z"][axis]
         ))
     };
-    (0..values.len()).filter_map(doubt).collect()
+    (0..rows.dim()).filter_map(doubt).collect()
 }
 
 #[cfg(test)]
@@ -146,7 +141,9 @@ mod tests {
 
     #[test]
     fn points_at_a_fixed_distance_along_published_vectors_are_read() {
-        let (from, towards) = (room(1.0), room(0.3));
+        let points = synthetic::room(0, 2000).points;
+        let [from, towards] =
+            [1.0, 0.3].map(|scale| points.iter().map(|p| p.map(|x| x * scale)).collect::<Vec<_>>());
         let to: Vec<[f64; 3]> = from.iter().zip(&towards).map(|(x, v)| along(x, 1.0, v)).collect();
         for (at, power) in [0.0, -1.0, -2.0].into_iter().enumerate() {
             let multiple = |v: &[f64; 3]| 7.0 * dot(v, v).powf(0.5 * power);
@@ -155,9 +152,5 @@ mod tests {
             let read = &at_fixed_distances(&from, &to, |row| &hidden[row])[at];
             assert!(read.iter().zip(&hidden).all(|(a, b)| distance(a, b) < 1e-9), "{power}");
         }
-    }
-
-    fn room(scale: f64) -> Vec<[f64; 3]> {
-        synthetic::room(0, 2000).points.iter().map(|p| p.map(|x| x * scale)).collect()
     }
 }

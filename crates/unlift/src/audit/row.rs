@@ -349,8 +349,7 @@ impl Row {
         type Ends = fn(&Intervals) -> &IndexMap<String, Interval>;
         let ends = |of: Ends, means: &ByThreshold, std: &ByThreshold| {
             let interval = |(label, mean): (&String, &f64)| {
-                let of =
-                    |row: &Row| row.interval.as_ref().and_then(|all| of(all).get(label)).copied();
+                let of = |row: &Row| of(row.interval.as_ref()?).get(label).copied();
                 let of: Option<Vec<Interval>> = rows.iter().map(of).collect();
                 Some((label.clone(), over_repeats(&of?, *mean, *std.get(label)?)))
             };

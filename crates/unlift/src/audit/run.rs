@@ -88,13 +88,11 @@ fn every_cell<const D: usize>(
 
 /// A scheme whose rule is unknown, because another program hid the points.
 #[derive(Debug)]
-struct Unknown {
-    name: String,
-}
+struct Unknown(String);
 
 impl<const D: usize> Scheme<D> for Unknown {
     fn name(&self) -> &str {
-        &self.name
+        &self.0
     }
 
     fn lift(&self, _: &LocalPoints<'_, D>, _: &Key) -> Result<Lifted<D>, Error> {
@@ -104,7 +102,7 @@ impl<const D: usize> Scheme<D> for Unknown {
 
 /// Returns a placeholder for the scheme called `name` in a plan for [`run_released`].
 pub fn scheme_called<const D: usize>(name: &str) -> Arc<dyn Scheme<D>> {
-    Arc::new(Unknown { name: name.to_owned() })
+    Arc::new(Unknown(name.to_owned()))
 }
 
 /// Runs `plan` on given records and their secret, which the plan's first scheme stands for

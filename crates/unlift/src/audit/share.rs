@@ -19,10 +19,9 @@ impl Threshold {
     /// # Errors
     /// When `text` is not a positive number.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        match text.trim().parse::<f64>() {
-            Ok(value) if value.is_finite() && value > 0.0 => {
-                Ok(Self { label: text.trim().to_owned(), value })
-            }
+        let label = text.trim().to_owned();
+        match label.parse::<f64>() {
+            Ok(value) if value.is_finite() && value > 0.0 => Ok(Self { label, value }),
             _ => Err(Error::new("threshold", "a positive number", format!("{text:?}"))),
         }
     }
@@ -86,9 +85,7 @@ impl Share {
     /// Returns the share among `points`, of which none is within that is not counted yet.
     pub(super) fn among(mut self, points: f64) -> Self {
         let [_, counted, ..] = self.0;
-        if points > counted {
-            self.merge(&Self::of(0.0, points - counted));
-        }
+        self.merge(&Self::of(0.0, points - counted));
         self
     }
 
@@ -155,12 +152,6 @@ pub(super) fn shares(thresholds: &[Threshold], share: impl Fn(&Threshold) -> Sha
     thresholds.iter().map(|t| (t.label.clone(), share(t))).collect()
 }
 
-pub(super) fn merge(to: &mut Shares, more: &Shares) {
-    for (label, more) in more {
-        to.entry(label.clone()).or_default().merge(more);
-    }
-}
-
 pub(super) fn percents(shares: &Shares) -> ByThreshold {
     shares.iter().map(|(label, share)| (label.clone(), share.percent())).collect()
 }
@@ -225,9 +216,9 @@ mod tests {
         assert_eq!(all.interval()[1], Share::of(0.0, 5_000.0).interval()[1]);
         assert!(all.interval()[1] > 0.07, "no point of 5,000 came back, but some may");
         assert_eq!(Share::default().interval(), [0.0, 100.0]);
-        let (mut two, mut three) = (Share::of(2.0, 10.0), Share::of(2.0, 10.0));
+        let mut two = Share::of(2.0, 10.0);
         two.merge(&Share::of(0.0, 5.0));
-        three.merge(&Share::of(0.0, 5.0));
+        let mut three = two;
         three.merge(&Share::of(0.0, 0.0));
         assert_eq!(two, three, "an image without points");
         let [a, b] = [Share::of(60.0, 100.0), Share::of(40.0, 100.0)];

@@ -5,7 +5,6 @@ use std::borrow::Cow;
 pub use super::plan::{key_of, oracle_seed};
 
 use super::cells::Finished;
-use super::clock::RowSeconds;
 use super::lists::{Kept, Lists};
 use super::many::{Pool, merge_counts};
 use super::plan::{NeighborsBy, Variant};
@@ -74,9 +73,8 @@ impl Pooled {
         let baseline = &baseline.unwrap_or_else(|| accuracy.clone());
         let weights = distinct_weights(original, secret);
         row.fill_distinct(&accuracy, baseline, &weights, &self.thresholds);
-        let (secret, whole, seconds) = (Cow::Borrowed(secret), Vec::new(), RowSeconds::default());
-        let finished =
-            Finished { row, accuracy, baseline, secret, weights, whole, n_listed: 0, seconds };
+        let (secret, whole) = (Cow::Borrowed(secret), Vec::new());
+        let finished = Finished { row, accuracy, baseline, secret, weights, whole, n_listed: 0 };
         let pool = Pool::of(&finished, &self.thresholds);
         match &mut self.pool {
             None => self.pool = Some(pool),

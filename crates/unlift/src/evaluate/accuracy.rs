@@ -108,10 +108,8 @@ fn compare<const D: usize>(
         recovered.positions()[slot] == stored
     };
     let n_exact = secret.swapped_axis().map(|_| hidden().filter(|slot| is_exact(*slot)).count());
-    let axis_percent = match (recovered.axis(), secret.swapped_axis()) {
-        (Some(axis), Some(true_axis)) => percent_equal(axis, true_axis),
-        _ => None,
-    };
+    let axes = recovered.axis().zip(secret.swapped_axis());
+    let axis_percent = axes.and_then(|(axis, true_axis)| percent_equal(axis, true_axis));
     let assignment_percent =
         recovered.descriptor_row().and_then(|row| percent_equal(row, secret.descriptor_row()));
     let errors = Accuracy::of(hidden().map(error).collect());
@@ -189,33 +187,21 @@ pub fn joined<'a, const D: usize>(
     original: &Original<D>,
     secret: &'a Secret,
 ) -> Cow<'a, Secret> {
-    if secret.slots_per_record() < 2 {
-        return Cow::Borrowed(secret);
-    }
-    match recovered.about().order {
-        RowOrder::Slots => Cow::Borrowed(secret),
-        RowOrder::DescriptorRows => Cow::Owned(secret.by_descriptor_row()),
-        RowOrder::Either | RowOrder::Unstated => {
-            Cow::Owned(in_better_order(recovered, original, &secret.by_descriptor_row()))
-        }
-    }
-}
-
-/// Returns `secret` with the two points of every record in the order with the smaller error.
-fn in_better_order<const D: usize>(
-    recovered: &Recovered<D>,
-    original: &Original<D>,
-    secret: &Secret,
-) -> Secret {
+    let by_row = match recovered.about().order {
+        _ if secret.slots_per_record() < 2 => return Cow::Borrowed(secret),
+        RowOrder::Slots => return Cow::Borrowed(secret),
+        RowOrder::DescriptorRows => return Cow::Owned(secret.by_descriptor_row()),
+        RowOrder::Either | RowOrder::Unstated => secret.by_descriptor_row(),
+    };
     let positions = original.reveal().positions();
     let error = |slot: usize, of: usize| {
         let position = recovered.position(slot);
-        position.map_or(0.0, |at| distance(&at, &positions[secret.hidden()[of].index()]))
+        position.map_or(0.0, |at| distance(&at, &positions[by_row.hidden()[of].index()]))
     };
-    secret.exchanged(|a| {
+    Cow::Owned(by_row.exchanged(|a| {
         let b = a + 1;
         error(a, b) + error(b, a) < error(a, a) + error(b, b)
-    })
+    }))
 }
 
 /// Returns for each slot 1 / the number of slots whose points have exactly the same place.
@@ -260,12 +246,6 @@ pub struct Bin {
 }
 
 impl Bin {
-    fn merge(&mut self, other: &Self) {
-        self.n += other.n;
-        self.expected += other.expected;
-        self.within += other.within;
-    }
-
     /// Returns the mean probability; `None` without points.
     pub fn predicted(&self) -> Option<f64> {
         (self.n > 0).then(|| self.expected / self.n as f64)
@@ -296,7 +276,11 @@ impl Reliability {
     /// Adds the points of another run.
     pub fn merge(&mut self, other: &Self) {
         self.n_points += other.n_points;
-        self.bins.iter_mut().zip(&other.bins).for_each(|(a, b)| a.merge(b));
+        for (all, more) in self.bins.iter_mut().zip(&other.bins) {
+            all.n += more.n;
+            all.expected += more.expected;
+            all.within += more.within;
+        }
     }
 }
 

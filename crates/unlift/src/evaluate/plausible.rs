@@ -359,40 +359,11 @@ fn area(support: &[f64], decoy: &[bool]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::neighbors::oracle::{self, TrueNeighbors};
-    use crate::obfuscate::{obfuscate, olc, ray};
-    use crate::seed::Key;
-    use crate::{PointSet, Unit, synthetic};
 
     #[test]
     fn areas_count_ties_half() {
         for (scores, expected) in [([1, 2, 3, 4], 1.0), ([1, 1, 1, 1], 0.5), ([3, 4, 1, 2], 0.0)] {
             assert_eq!(area(&scores.map(f64::from), &[true, true, false, false]), expected);
         }
-    }
-
-    #[test]
-    fn true_neighbors_tell_decoys() {
-        let points = PointSet::try_new(synthetic::room(1, 600).points, Unit::Meter).unwrap();
-        let original = Original::new(points);
-        let search = oracle::search(&original).unwrap();
-        let lists = |secret: &Secret| {
-            let near = TrueNeighbors::new(&search, secret, 12).unwrap();
-            near.at_inlier_ratio(1.0, 0).unwrap()
-        };
-        let key = Key::from_seed(0);
-        let (released, secret) = obfuscate(&ray::SPHERE, &original, None, &key).unwrap();
-        let truth = Truth { original: &original, released: &released, secret: &secret };
-        let figures = truth.bearings(&lists(&secret));
-        let of = |name: &str| figures.iter().find(|(known, _)| known == name).unwrap().1;
-        assert!((of("real_bearings_percent") - 100.0 / 3.0).abs() < 0.2);
-        // Twelve neighbors among 600 points cover a wider angle than the attack expects.
-        assert!(of("decoys_area") > 0.75, "{figures:?}");
-        assert!(of("decoys_precision_percent") > 80.0, "{figures:?}");
-        assert!(of("decoys_recall_percent") > 60.0, "{figures:?}");
-        // Lines are no bearings.
-        let (released, secret) = obfuscate(&olc::ENTRY, &original, None, &key).unwrap();
-        let truth = Truth { original: &original, released: &released, secret: &secret };
-        assert_eq!(truth.bearings(&lists(&secret)), []);
     }
 }

@@ -105,7 +105,7 @@ impl Localization {
 }
 
 /// Returns the upper median, which does not err toward accuracy; `None` without values, or if it is infinite.
-fn upper_median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied().filter(|value| value.is_finite())
 }

@@ -41,8 +41,8 @@ impl Match {
     /// Returns the residuals in pixels, and their number; `None` if the point is behind the camera.
     fn residuals(&self, camera: &Camera) -> Option<([f64; 2], usize)> {
         let Self { place, point, line } = self;
-        match line {
-            None => Some((sub(&camera.project(point)?, place), 2)),
+        let (off, length) = match line {
+            None => return Some((sub(&camera.project(point)?, place), 2)),
             Some(OnLine::OfMap(direction)) => {
                 let x = camera.pose.in_camera(point);
                 let d = camera.pose.rotation.map(|row| dot(&row, direction));
@@ -51,17 +51,15 @@ impl Match {
                 let plane = cross(&x, &d);
                 let (a, b) = (plane[0] / focal[0], plane[1] / focal[1]);
                 let away = sub(place, principal);
-                let length = libm::hypot(a, b);
-                let off = (a * away[0] + b * away[1] + plane[2]) / length;
-                (length > 0.0).then_some(([off, 0.0], 1))
+                (a * away[0] + b * away[1] + plane[2], libm::hypot(a, b))
             }
             Some(OnLine::OfImage(direction)) => {
                 let away = sub(&camera.project(point)?, place);
-                let length = libm::hypot(direction[0], direction[1]);
-                let off = (away[0] * direction[1] - away[1] * direction[0]) / length;
-                (length > 0.0).then_some(([off, 0.0], 1))
+                let off = away[0] * direction[1] - away[1] * direction[0];
+                (off, libm::hypot(direction[0], direction[1]))
             }
-        }
+        };
+        (length > 0.0).then_some(([off / length, 0.0], 1))
     }
 }
 
@@ -127,18 +125,14 @@ fn refine(camera: &mut Camera, matches: &[Match], weight: impl Fn(f64) -> f64) {
         let mut slope = Vector6::zeros();
         let steps: [f64; 6] = std::array::from_fn(|c| if c < 3 { 1e-6 } else { 1e-6 * depth });
         let all_moved: [Camera; 6] = std::array::from_fn(|c| {
-            let mut by = [0.0; 6];
-            by[c] = steps[c];
-            moved(camera, &by)
+            moved(camera, &std::array::from_fn(|k| if k == c { steps[c] } else { 0.0 }))
         });
         for (input, weight) in matches.iter().zip(&weights) {
             let Some((r, n)) = input.residuals(camera).filter(|_| *weight > 0.0) else { continue };
             let mut rows = [Vector6::zeros(); 2];
             for c in 0..6 {
                 let Some((after, _)) = input.residuals(&all_moved[c]) else { continue };
-                rows.iter_mut()
-                    .enumerate()
-                    .for_each(|(k, row)| row[c] = (after[k] - r[k]) / steps[c]);
+                (0..2).for_each(|k| rows[k][c] = (after[k] - r[k]) / steps[c]);
             }
             for k in 0..n {
                 normal += rows[k] * rows[k].transpose() * *weight;

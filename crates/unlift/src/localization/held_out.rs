@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::cost::{FEWEST_HELD_OUT, HeldOut, Localization};
+use super::cost::{FEWEST_HELD_OUT, HeldOut, Localization, upper_median};
 use super::estimate::{Match, OnLine, estimate};
 use super::matches::{Pair, Unit32, mutual, with_protected};
 use super::{View, free_directions};
@@ -66,8 +66,8 @@ pub struct Held<'a> {
     queries: Vec<Query>,
     /// One row per point. Points that are not part of the map have the descriptor of another.
     descriptors: Descriptors,
-    /// Whether a point is found in enough other images.
-    is_part: Vec<bool>,
+    /// The points of the map, ascending: those that enough other images show.
+    parts: Vec<usize>,
     /// Matches by the descriptors that they depend on.
     known: Vec<Known>,
 }
@@ -119,14 +119,14 @@ impl<'a> Held<'a> {
                 sum.iter_mut().zip(unit.row(keypoint)).for_each(|(sum, x)| *sum += x);
             }
         }
-        let is_part: Vec<bool> = found.iter().map(|&n| n >= FEWEST_OTHERS).collect();
-        let parts: Vec<usize> = (0..positions.len()).filter(|&row| is_part[row]).collect();
+        let is_part = |row: usize| found[row] >= FEWEST_OTHERS;
+        let parts: Vec<usize> = (0..positions.len()).filter(|&row| is_part(row)).collect();
         if parts.is_empty() {
             let expected = "keypoints at the projections of the map's points";
             return Err(Error::new("features", expected, "none"));
         }
         // Mitigations learn from all rows, so the other rows have the same distribution.
-        let row = |row: usize| if is_part[row] { row } else { parts[row % parts.len()] };
+        let row = |row: usize| if is_part(row) { row } else { parts[row % parts.len()] };
         let scaled = (0..positions.len()).flat_map(|at| {
             let sum = &sums[row(at) * dim..][..dim];
             let length = sum.iter().map(|x| x * x).sum::<f32>().sqrt();
@@ -141,13 +141,13 @@ impl<'a> Held<'a> {
         let others = views.iter().zip(&held).filter(|(_, is_held)| !**is_held);
         let others = others.map(|(view, _)| view).collect();
         let descriptors = Descriptors::try_new(values, dim)?;
-        Ok(Self { original, others, queries, descriptors, is_part, known: Vec::new() })
+        Ok(Self { original, others, queries, descriptors, parts, known: Vec::new() })
     }
 
     /// Returns a note about the map and the images.
     pub fn note(&self) -> String {
-        let n = self.is_part.iter().filter(|part| **part).count();
-        let (n_images, n_points) = (self.queries.len(), self.is_part.len());
+        let (n, n_points) = (self.parts.len(), self.original.len());
+        let n_images = self.queries.len();
         let few = format!(
             " (fewer than {FEWEST_HELD_OUT} do not tell schemes apart, so only the bound counts)"
         );
@@ -168,8 +168,9 @@ impl<'a> Held<'a> {
     pub fn with_map(&mut self, scheme: &dyn Scheme<3>, key: &Key) -> Result<Vec<Problem>, Error> {
         let (released, secret) = obfuscate(scheme, self.original, Some(&self.descriptors), key)?;
         let secret = secret.by_descriptor_row();
+        let is_part = |point: &usize| self.parts.binary_search(point).is_ok();
         let rows = secret.hidden().iter().enumerate().map(|(row, id)| (id.index(), row as u32));
-        let mut rows: Vec<(usize, u32)> = rows.filter(|(point, _)| self.is_part[*point]).collect();
+        let mut rows: Vec<(usize, u32)> = rows.filter(|(point, _)| is_part(point)).collect();
         rows.sort_unstable();
         let (points, rows): (Vec<usize>, Vec<u32>) = rows.into_iter().unzip();
         let compared = match released.protected() {
@@ -192,8 +193,8 @@ impl<'a> Held<'a> {
         scheme: &dyn Scheme<2>,
         key: &Key,
     ) -> Result<Vec<Problem>, Error> {
-        let mut pairs = self.pairs_in_the_clear();
-        let (points, map) = self.parts();
+        let all_in_the_clear = self.pairs_in_the_clear();
+        let (points, map) = (&self.parts, self.in_the_clear());
         let hide = |number: usize| {
             let query = &self.queries[number];
             let keypoints = PointSet::try_new(query.places.clone(), Unit::Pixel)?;
@@ -201,34 +202,31 @@ impl<'a> Held<'a> {
             let key = key.of_item(Stage::Image, number as u64);
             let (released, secret) = obfuscate(scheme, &original, None, &key)?;
             let free = free_directions(&released, &secret);
-            let Some(protection) = scheme.changes().into_iter().find_map(Change::protection) else {
-                return Ok((free, None));
+            let pairs = match scheme.changes().into_iter().find_map(Change::protection) {
+                None => all_in_the_clear[number].clone(),
+                Some(protection) => {
+                    let protected = protection.protect(&query.descriptors.plain()?, &key)?;
+                    let pairs = with_protected(&map, &protected, true).into_iter();
+                    pairs.map(|(keypoint, at)| (keypoint, points[at])).collect()
+                }
             };
-            let protected = protection.protect(&query.descriptors.plain()?, &key)?;
-            let pairs = with_protected(&map, &protected, true).into_iter();
-            Ok((free, Some(pairs.map(|(i, j)| (i, points[j])).collect::<Vec<_>>())))
+            Ok((free, pairs))
         };
         let hidden = parallel::map(self.queries.len(), hide).into_iter();
-        let (free, of_protected): (Vec<Vec<Option<[f64; 2]>>>, Vec<_>) =
+        let (free, pairs): (Vec<Vec<Option<[f64; 2]>>>, Vec<_>) =
             hidden.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
-        if let Some(own) = of_protected.into_iter().collect::<Option<Vec<_>>>() {
-            pairs = Arc::new(own);
-        }
         Ok(self.problems(&pairs, |image, (keypoint, _), place, point| {
             Some(Match { place, point, line: Some(OnLine::OfImage(free[image][keypoint]?)) })
         }))
     }
 
     fn pairs_in_the_clear(&mut self) -> Arc<Vec<Vec<Pair>>> {
-        let (rows, unit) = self.parts();
-        self.pairs(rows, Compared::Plain(unit))
+        self.pairs(self.parts.clone(), Compared::Plain(self.in_the_clear()))
     }
 
-    /// Returns the points of the map, and their descriptors.
-    fn parts(&self) -> (Vec<usize>, Unit32) {
-        let rows: Vec<usize> = (0..self.is_part.len()).filter(|&row| self.is_part[row]).collect();
-        let unit = Unit32::of(&self.descriptors, rows.iter().copied());
-        (rows, unit)
+    /// Returns the descriptors of the points of the map.
+    fn in_the_clear(&self) -> Unit32 {
+        Unit32::of(&self.descriptors, self.parts.iter().copied())
     }
 
     /// Returns the matches of every image with the points `rows`, whose descriptors are `compared`.
@@ -289,7 +287,7 @@ impl<'a> Held<'a> {
         if pairs.is_empty() {
             return None;
         }
-        let mut is_matched = vec![false; self.is_part.len()];
+        let mut is_matched = vec![false; self.original.len()];
         pairs.iter().for_each(|(_, row)| is_matched[*row] = true);
         let shared =
             |view: &View| view.observed.iter().filter(|&&row| is_matched[row as usize]).count();
@@ -322,11 +320,6 @@ impl Problem {
     }
 }
 
-/// Estimates the poses of all images and returns their errors; `None` without an estimate.
-pub fn locate(problems: &[Problem], seed: u64) -> Vec<Option<PoseError>> {
-    parallel::map(problems.len(), |at| problems[at].solve(seed.wrapping_add(at as u64)))
-}
-
 impl HeldOut {
     /// Summarizes the errors of all images beside the unprotected ones. `limits` are pairs of errors with their names.
     pub(super) fn of(
@@ -336,10 +329,8 @@ impl HeldOut {
     ) -> Self {
         let [own, base] = [errors, unprotected].map(|errors| Localization::of("", errors, errors));
         let middle = |count: fn(&Problem) -> usize| {
-            let mut counts: Vec<usize> = problems.iter().map(count).collect();
-            counts.sort_unstable();
-            // The upper one of an even number.
-            counts.get(counts.len() / 2).map_or(f64::INFINITY, |&n| n as f64)
+            let counts = problems.iter().map(|problem| count(problem) as f64);
+            upper_median(counts.collect()).unwrap_or(f64::INFINITY)
         };
         let recall = |(name, max_center, max_angle): &(String, f64, f64)| {
             let is_within = |error: &&PoseError| {

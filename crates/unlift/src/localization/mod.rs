@@ -17,12 +17,13 @@ pub use matches::{Unit32, mutual};
 
 use std::sync::Arc;
 
+use crate::geometry::camera::PoseError;
 use crate::obfuscate::{Change, Changed, Protection, SCHEMES, Scheme, SchemeOptions, obfuscate};
 use crate::seed::Key;
 use crate::truth::Original;
 use crate::{Error, Unit};
+use unlift_attack::parallel;
 
-#[derive(Clone, Copy)]
 enum Protects<'a> {
     Nothing,
     Map(&'a dyn Scheme<3>),
@@ -46,16 +47,15 @@ pub fn of_schemes(
     let (points, key) = (original.reveal(), Key::from_seed(seed));
     let positions = points.positions();
     let base = unprotected(views, positions);
-    let changes_descriptors =
-        |changes: Vec<&Change>| changes.into_iter().any(Change::changes_descriptors);
-    let mut rows = vec![(Protects::Nothing, Localization::of(UNPROTECTED, &base, &base))];
+    let row = |name: &str, changes: Vec<&Change>, errors: &[Option<PoseError>]| Localization {
+        changes_descriptors: changes.into_iter().any(Change::changes_descriptors),
+        ..Localization::of(name, errors, &base)
+    };
+    let mut rows = vec![(Protects::Nothing, row(UNPROTECTED, Vec::new(), &base))];
     for scheme in schemes {
         let Ok((released, secret)) = obfuscate(&**scheme, original, None, &key) else { continue };
         let errors = with_map(views, positions, &released, &secret);
-        let changes_descriptors = changes_descriptors(scheme.changes());
-        let row =
-            Localization { changes_descriptors, ..Localization::of(scheme.name(), &errors, &base) };
-        rows.push((Protects::Map(&**scheme), row));
+        rows.push((Protects::Map(&**scheme), row(scheme.name(), scheme.changes(), &errors)));
     }
     let options = SchemeOptions::usual(Unit::Pixel);
     let mut queries: Vec<Arc<dyn Scheme<2>>> =
@@ -64,12 +64,8 @@ pub fn of_schemes(
     queries.extend(Changed::all(&queries, &changes));
     for scheme in &queries {
         let errors = with_queries(views, positions, &**scheme, &key)?;
-        let row = Localization {
-            of_queries: true,
-            changes_descriptors: changes_descriptors(scheme.changes()),
-            ..Localization::of(scheme.name(), &errors, &base)
-        };
-        rows.push((Protects::Queries(&**scheme), row));
+        let row = row(scheme.name(), scheme.changes(), &errors);
+        rows.push((Protects::Queries(&**scheme), Localization { of_queries: true, ..row }));
     }
     if let Some(held) = held {
         let limits: Vec<(String, f64, f64)> = match points.unit() {
@@ -91,7 +87,8 @@ pub fn of_schemes(
                 Protects::Map(scheme) => held.with_map(*scheme, &key)?,
                 Protects::Queries(scheme) => held.with_queries(*scheme, &key)?,
             };
-            let errors = held_out::locate(&problems, seed);
+            let solve = |at: usize| problems[at].solve(seed.wrapping_add(at as u64));
+            let errors = parallel::map(problems.len(), solve);
             // The first row is that of the map itself.
             let of_map = base.as_ref().unwrap_or(&errors);
             row.held_out = Some(HeldOut::of(&problems, [&errors, of_map], &limits));

@@ -36,8 +36,8 @@ impl TrueNeighbors {
             };
             return Err(Error::new("k", expected, k));
         }
-        let mut records = vec![RecordId(0); secret.n_slots() * k];
-        Nearness::new(knn, secret).each(k, &mut records, &|_, near, row| row.copy_from_slice(near));
+        let nearness = Nearness::new(knn, secret);
+        let records = nearness.each(k, k, &|_, near, row| row.copy_from_slice(near));
         Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
     }
 
@@ -147,24 +147,31 @@ type Make<'a> = dyn Fn(usize, &mut [RecordId], &mut [RecordId]) + Sync + 'a;
 struct Nearness<'a, const D: usize> {
     knn: &'a Knn<'a, D>,
     secret: &'a Secret,
+    /// The record that hides each original; `None` for dropped points.
     record_of: Vec<Option<RecordId>>,
 }
 
 impl<'a, const D: usize> Nearness<'a, D> {
     fn new(knn: &'a Knn<'a, D>, secret: &'a Secret) -> Self {
-        Self { knn, secret, record_of: record_of_originals(secret) }
+        let mut record_of = vec![None; secret.n_originals()];
+        for (slot, id) in secret.hidden().iter().enumerate() {
+            let record = RecordId::from_index(slot / secret.slots_per_record());
+            record_of[id.index()] = Some(record);
+        }
+        Self { knn, secret, record_of }
     }
 
-    /// Calls `make(slot, the n records nearest to its original, row)` for every slot. `rows` holds
-    /// rows of equal length, slot by slot. At least `n` other records must exist.
-    fn each(&self, n: usize, rows: &mut [RecordId], make: &Make<'_>) {
+    /// Calls `make(slot, the n records nearest to its original, row)` for every slot, and returns the rows of
+    /// `length` records, slot by slot. At least `n` other records must exist.
+    fn each(&self, n: usize, length: usize, make: &Make<'_>) -> Vec<RecordId> {
         let hidden = self.secret.hidden();
-        let length = (rows.len() / hidden.len().max(1)).max(1);
-        let mut rows: Vec<&mut [RecordId]> = rows.chunks_mut(length).collect();
+        let mut all = vec![RecordId(0); hidden.len() * length];
+        let mut rows: Vec<&mut [RecordId]> = all.chunks_mut(length.max(1)).collect();
         parallel::for_each_mut(&mut rows, Default::default, |(near, records), slot, row| {
             self.from(hidden[slot].index(), n, near, records);
             make(slot, records, row);
         });
+        all
     }
 
     /// Writes the `n` records nearest to `original` (fewer if there are fewer) to `records`, each once, without its own.
@@ -195,15 +202,6 @@ impl<'a, const D: usize> Nearness<'a, D> {
             reach *= 2;
         }
     }
-}
-
-/// Returns the record that hides each original; `None` for dropped points.
-fn record_of_originals(secret: &Secret) -> Vec<Option<RecordId>> {
-    let mut record_of = vec![None; secret.n_originals()];
-    for (slot, original) in secret.hidden().iter().enumerate() {
-        record_of[original.index()] = Some(RecordId::from_index(slot / secret.slots_per_record()));
-    }
-    record_of
 }
 
 /// Returns true if `records` contains `record`; comparing all is faster than stopping early.
@@ -340,17 +338,15 @@ impl Outliers {
         let first = RING.0 * truth.k;
         let end = (RING.1 * truth.k).min(truth.n_records - 1);
         let per_slot = truth.k.min(end.saturating_sub(first));
-        let mut records = vec![RecordId(0); nearness.secret.n_slots() * per_slot];
-        if per_slot > 0 {
-            nearness.each(end, &mut records, &|slot, near, row| {
-                let ring = &mut near[first..];
-                let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
-                for (at, entry) in row.iter_mut().enumerate() {
-                    ring.swap(at, at + draws.below((ring.len() - at) as u64) as usize);
-                    *entry = ring[at];
-                }
-            });
-        }
+        // Without a ring there are no rows.
+        let records = nearness.each(end, per_slot, &|slot, near, row| {
+            let ring = &mut near[first..];
+            let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
+            for (at, entry) in row.iter_mut().enumerate() {
+                ring.swap(at, at + draws.below((ring.len() - at) as u64) as usize);
+                *entry = ring[at];
+            }
+        });
         Self::Near(records, per_slot)
     }
 

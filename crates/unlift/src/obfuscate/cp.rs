@@ -1,7 +1,7 @@
 //! Scheme `cp`: random pairs exchange one coordinate. In images it is `cp2d`, for each image separately.
 
 use super::ppl::random_pairs;
-use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted};
 use crate::Error;
 use crate::released::{AxisCandidates, Obfuscation};
 use crate::seed::{Key, Stage};
@@ -14,7 +14,7 @@ pub const ENTRY: Entry = Entry {
     source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
     hidden: "which coordinate was exchanged, and its value",
     patents: "none found",
-    ..Entry::new("cp", Lift::In3d(lift))
+    ..Entry::new("cp", Lift::In3d(|points, key, _| lift(points.positions, key)))
 };
 
 /// Registry entry in images.
@@ -22,17 +22,13 @@ pub const CP2D: Entry = Entry {
     name: "cp2d",
     title: "Coordinate permutation in the image",
     rule: "Two keypoints swap one of their two coordinates.",
-    lift: Lift::In2d(lift),
+    lift: Lift::In2d(|points, key, _| lift(points.positions, key)),
     ..ENTRY
 };
 
 /// Coordinate permutation.
-fn lift<const D: usize>(
-    points: &LocalPoints<'_, D>,
-    key: &Key,
-    _: &SchemeOptions,
-) -> Result<Lifted<D>, Error> {
-    let (points, key) = (points.positions, key.stage(Stage::Scheme));
+fn lift<const D: usize>(points: &[[f64; D]], key: &Key) -> Result<Lifted<D>, Error> {
+    let key = key.stage(Stage::Scheme);
     let (pairs, dropped) = random_pairs(points.len(), &mut key.draws(0));
     let (mut positions, mut hidden) = (Vec::new(), Vec::new());
     let mut swapped_axis = Vec::new();

@@ -1,6 +1,6 @@
 //! Obfuscation: applies a scheme, then the steps that all schemes share (origin, shuffling).
 
-use super::change::Change;
+use super::changed::Change;
 use super::scheme::{LocalPoints, Scheme};
 use crate::geometry::frame::{Bounds, rounded_origin};
 use crate::geometry::vector::{quantile_of, sub};
@@ -36,10 +36,8 @@ pub fn obfuscate<const D: usize>(
     check_size(points.positions())?;
     // The center of known bounds reveals nothing about the points.
     let bounds = original.bounds();
-    let origin = match &bounds {
-        Some(bounds) => bounds.center(),
-        None => rounded_origin(points.positions()),
-    };
+    let origin =
+        bounds.map_or_else(|| rounded_origin(points.positions()), |bounds| bounds.center());
     let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
     let local = LocalPoints { positions: &local, bounds: bounds.map(|b| b.about(&origin)) };
     let lifted = scheme.lift(&local, key)?;

@@ -98,10 +98,7 @@ impl Mitigation {
         key: &Key,
     ) -> Result<Descriptors, Error> {
         let (n, dim) = (descriptors.len(), descriptors.dim());
-        let mut values: Vec<f64> = match descriptors.values() {
-            Values::U8(values) => values.iter().copied().map(f64::from).collect(),
-            Values::F32(values) => values.iter().copied().map(f64::from).collect(),
-        };
+        let mut values: Vec<f64> = descriptors.rows().flatten().map(f64::from).collect();
         let lengths: Vec<f64> = values.chunks(dim).map(length).collect();
         for (row, length) in values.chunks_mut(dim).zip(&lengths) {
             row.iter_mut().for_each(|x| *x /= length.max(1e-12));
@@ -270,21 +267,16 @@ mod tests {
         let key = Key::from_seed(3);
         let values = (0..1600).map(|at| key.draws(Stage::Shapes, at).normal() as f32).collect();
         let before = Descriptors::try_new(Values::F32(values), 8).unwrap();
-        let rows = |of: &Descriptors| -> Vec<Vec<f32>> {
-            let mut rows = vec![vec![0.0; 8]; 200];
-            rows.iter_mut().enumerate().for_each(|(at, row)| of.read_row(at, row));
-            rows
-        };
-        let after = |text| {
-            let key = Key::from_seed(1);
-            rows(&Mitigation::parse(text).unwrap().descriptors(&before, &key).unwrap())
+        let after = |text| -> Vec<Vec<f32>> {
+            let mitigation = Mitigation::parse(text).unwrap();
+            mitigation.descriptors(&before, &Key::from_seed(1)).unwrap().rows().collect()
         };
         let zeros = after("drop:0.25").iter().filter(|row| row.iter().all(|&x| x == 0.0)).count();
         assert_eq!(zeros, 50);
         // Before lengths are restored, a column has two levels of each sign.
         let signs = after("bits:1");
         assert!(signs.iter().flatten().all(|x| *x != 0.0));
-        let before = rows(&before);
+        let before: Vec<Vec<f32>> = before.rows().collect();
         let mean = |other: &[Vec<f32>]| {
             let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
             let cosine =

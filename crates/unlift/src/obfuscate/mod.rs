@@ -3,7 +3,6 @@
 //! A scheme, built-in or custom, implements only its rule ([`Scheme::lift`]). This module does the
 //! rest for all: origin, normal form, order of records, slots and descriptors.
 
-mod change;
 mod changed;
 mod hide;
 mod mitigate;
@@ -16,8 +15,7 @@ pub mod plane;
 pub mod ppl;
 pub mod ray;
 
-pub use change::Change;
-pub use changed::Changed;
+pub use changed::{Change, Changed};
 pub use hide::obfuscate;
 pub use mitigate::Mitigation;
 pub use protect::Protection;

@@ -3,7 +3,7 @@
 //! The published code of `ppl+` takes the normal from a row of the wrong matrix, so it depends on the orientation of the map. This
 //! implementation follows the paper: the normal is the direction of least spread of the neighbors.
 
-use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted};
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, squared_distance, sub};
@@ -20,28 +20,26 @@ pub const ENTRY: Entry = Entry {
     source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
     hidden: "two positions along the line and which descriptor is whose",
     patents: "application declared by its authors; line clouds as for olc",
-    ..Entry::new("ppl", Lift::In3d(lift))
+    ..Entry::new("ppl", Lift::In3d(|points, key, _| lift(points.positions, key)))
 };
 
-/// Maximum number of re-pairings of coincident points before they are dropped.
-const RE_DRAWS: usize = 100;
-
-/// Paired-point lifting.
-fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
-    let (points, mut draws) = (points.positions, key.draws(Stage::Scheme, 0));
-    let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
-    let accept = |pair: &[OriginalId; 2]| apart(points, pair);
-    let mut refused = refused_last(&mut pairs, accept);
-    for _ in 0..RE_DRAWS {
-        if refused == 0 {
-            break;
-        }
-        // Coincident points need other partners, so as many accepted pairs join the pool.
-        let pool = (2 * refused).min(pairs.len());
-        refused = pair_again(&mut pairs, pool, &mut draws, accept);
-    }
-    lines_through(points, pairs, refused, dropped)
+/// Paired-point lifting. Coincident points need other partners, so as many accepted pairs are paired again with them.
+fn lift(points: &[[f64; 3]], key: &Key) -> Result<Lifted<3>, Error> {
+    lines_through_pairs(points, key, Again { rounds: 100, few: 1, pool: 2 }, |_| true)
 }
+
+/// When and how refused pairs are paired again.
+struct Again {
+    /// Maximum number of rounds.
+    rounds: usize,
+    /// It ends when fewer pairs than this are refused.
+    few: usize,
+    /// Number of pairs that are paired again, for each refused one.
+    pool: usize,
+}
+
+/// It stalls after this many rounds, if this many rounds in a row changed nothing.
+const STALL: (usize, usize) = (100, 50);
 
 /// Returns true if two points are far enough apart to define a line in `f64`.
 fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
@@ -50,13 +48,31 @@ fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
     squared_distance(&a, &b) > size2 * 1e-24
 }
 
-/// Returns the lines through all pairs but the last `refused`, whose points are dropped.
-fn lines_through(
+/// Returns the lines through random pairs of points that are apart and that `accept` accepts. Points of pairs
+/// that are refused in the end are dropped.
+fn lines_through_pairs(
     points: &[[f64; 3]],
-    mut pairs: Vec<[OriginalId; 2]>,
-    refused: usize,
-    mut dropped: Vec<Dropped>,
+    key: &Key,
+    again: Again,
+    accept: impl Fn(&[OriginalId; 2]) -> bool,
 ) -> Result<Lifted<3>, Error> {
+    let mut draws = key.draws(Stage::Scheme, 0);
+    let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
+    let accept = |pair: &[OriginalId; 2]| apart(points, pair) && accept(pair);
+    let mut refused = refused_last(&mut pairs, accept);
+    let mut unchanged = 0;
+    for round in 1..=again.rounds {
+        if refused < again.few {
+            break;
+        }
+        let (before, start) = (refused, pairs.len().saturating_sub(again.pool * refused));
+        draws.shuffle(pairs[start..].as_flattened_mut());
+        refused = refused_last(&mut pairs[start..], accept);
+        unchanged = if refused == before { unchanged + 1 } else { 0 };
+        if round > STALL.0 && unchanged >= STALL.1 {
+            break;
+        }
+    }
     for pair in pairs.split_off(pairs.len() - refused) {
         let reason = match apart(points, &pair) {
             true => DropReason::RejectedPair,
@@ -78,25 +94,15 @@ pub const PLUS: Entry = Entry {
     rule: "Two points share a line that leaves the surface around them.",
     color: 2,
     patents: "as ppl",
-    lift: Lift::In3d(lift_off_surfaces),
+    lift: Lift::In3d(|points, key, _| lift_off_surfaces(points.positions, key)),
     ..ENTRY
 };
 
-const MAX_ROUNDS: usize = 1000;
-/// Re-pairing ends when fewer pairs than this are refused.
-const FEW_PAIRS: usize = 10;
-/// Re-pairing stalls after this many rounds, if this many rounds in a row changed nothing.
-const STALL: (usize, usize) = (100, 50);
 /// sin(20 degrees). A line is refused if its angle to the surface is at most 20 degrees.
 const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
 
 /// Paired-point lifting with plane rejection.
-fn lift_off_surfaces(
-    points: &LocalPoints<'_, 3>,
-    key: &Key,
-    _: &SchemeOptions,
-) -> Result<Lifted<3>, Error> {
-    let points = points.positions;
+fn lift_off_surfaces(points: &[[f64; 3]], key: &Key) -> Result<Lifted<3>, Error> {
     let normals = normals(points)?;
     let on_surface = |pair: &[OriginalId; 2]| {
         let [a, b] = pair.map(|id| points[id.index()]);
@@ -104,23 +110,8 @@ fn lift_off_surfaces(
         let limit = SIN_20_DEGREES * dot(&along, &along).sqrt();
         normals[pair[0].index()].is_some_and(|normal| dot(&along, &normal).abs() <= limit)
     };
-    let mut draws = key.draws(Stage::Scheme, 0);
-    let (mut pairs, dropped) = random_pairs(points.len(), &mut draws);
-    let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
-    let mut refused = refused_last(&mut pairs, accept);
-    let mut unchanged = 0;
-    for round in 1..=MAX_ROUNDS {
-        if refused < FEW_PAIRS {
-            break;
-        }
-        let before = refused;
-        refused = pair_again(&mut pairs, refused, &mut draws, accept);
-        unchanged = if refused == before { unchanged + 1 } else { 0 };
-        if round > STALL.0 && unchanged >= STALL.1 {
-            break;
-        }
-    }
-    lines_through(points, pairs, refused, dropped)
+    let again = Again { rounds: 1000, few: 10, pool: 1 };
+    lines_through_pairs(points, key, again, |pair| !on_surface(pair))
 }
 
 /// Returns the normal of the surface through the nearest 1 % of points (4 to 100, even) of each.
@@ -146,19 +137,6 @@ pub(super) fn random_pairs(
     let (pairs, odd) = order.as_chunks::<2>();
     let dropped = |&id: &u32| Dropped { original: OriginalId(id), reason: DropReason::OddPoint };
     (pairs.iter().map(|pair| pair.map(OriginalId)).collect(), odd.iter().map(dropped).collect())
-}
-
-/// Pairs the last `refused` pairs again; returns how many are refused, which it moves to the end.
-fn pair_again(
-    pairs: &mut [[OriginalId; 2]],
-    refused: usize,
-    draws: &mut Draws<Cipher>,
-    accept: impl Fn(&[OriginalId; 2]) -> bool,
-) -> usize {
-    let start = pairs.len() - refused;
-    let again = &mut pairs[start..];
-    draws.shuffle(again.as_flattened_mut());
-    refused_last(again, accept)
 }
 
 /// Moves the pairs that `accept` refuses to the end and returns their number.

@@ -12,14 +12,16 @@ use crate::seed::{Cipher, Draws, Key, Stage};
 use crate::{Descriptors, Error};
 use unlift_attack::parallel;
 
-/// Directions of a subspace.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Directions {
-    Random,
-    /// Towards random entries of the public database.
-    Adversarial,
-    /// Half towards entries, the others random.
-    Hybrid,
+unlift_attack::named! {
+    /// Directions of a subspace.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Directions {
+        Random = "random",
+        /// Towards random entries of the public database.
+        Adversarial = "adversarial",
+        /// Half towards entries, the others random.
+        Hybrid = "hybrid",
+    }
 }
 
 /// A rule that protects descriptors, and the public descriptors that it uses.
@@ -57,12 +59,7 @@ impl Protection {
         let found = match name {
             "subspace" => {
                 let (m, how) = rest.split_once(':').unwrap_or((rest, "hybrid"));
-                let directions = match how {
-                    "random" => Directions::Random,
-                    "adversarial" => Directions::Adversarial,
-                    "hybrid" => Directions::Hybrid,
-                    _ => return Err(wrong()),
-                };
+                let directions = Directions::named(how).ok_or_else(wrong)?;
                 let least = if directions == Directions::Hybrid { 2 } else { 1 };
                 let m = m.parse().ok().filter(|m| (least..=MOST_DIRECTIONS).contains(m));
                 m.map(|m| (Rule::Subspace { m }, directions, 0))
@@ -86,8 +83,7 @@ impl Protection {
     pub fn name(&self) -> String {
         match (self.rule, self.directions) {
             (Rule::Subspace { m }, Directions::Hybrid) => format!("subspace{m}"),
-            (Rule::Subspace { m }, Directions::Random) => format!("subspace{m}.random"),
-            (Rule::Subspace { m }, Directions::Adversarial) => format!("subspace{m}.adversarial"),
+            (Rule::Subspace { m }, how) => format!("subspace{m}.{}", how.name()),
             (Rule::Words { m, epsilon }, _) => format!("ldp{}.{m}.{epsilon}", self.n_words),
         }
     }
@@ -332,12 +328,11 @@ mod tests {
         for text in ["subspace:2:random", "subspace:3", "subspace:4:adversarial"] {
             let made = protected(text, &plain, 2);
             let Rule::Subspace { m } = made.rule() else { panic!("{text}") };
-            for (at, plain) in unit_rows(&plain).enumerate() {
+            for (at, (plain, row)) in unit_rows(&plain).zip(made.rows().rows()).enumerate() {
                 let similar = made.similarities(&plain)[at];
                 assert!((similar - 1.0).abs() < 1e-5, "{text}: {similar}");
-                let mut row = vec![0.0; (m + 1) * DIM];
-                made.rows().read_row(at, &mut row);
                 let parts: Vec<&[f32]> = row.chunks(DIM).skip(1).collect();
+                assert_eq!(parts.len(), m, "{text}");
                 for (i, one) in parts.iter().enumerate() {
                     for (j, other) in parts[..=i].iter().enumerate() {
                         let unit = if i == j { 1.0 } else { 0.0 };

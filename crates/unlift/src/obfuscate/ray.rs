@@ -1,9 +1,7 @@
 //! Schemes of half-lines: from one of two centers, which is chosen at random for every point (`ray`) or by a checkerboard of voxels
 //! (`ray-voxel`); from one of two anchors of an image (`dcl2d`); and from the center of a map, among decoys (`sphere`).
 
-use std::cmp::Ordering;
-
-use super::scheme::{Entry, Lift, Lifted, LocalPoints, SchemeOptions};
+use super::scheme::{Entry, Lift, Lifted, LocalPoints};
 use crate::geometry::vector::{along, dot, squared_distance, sub, widen};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};
@@ -19,7 +17,7 @@ pub const ENTRY: Entry = Entry {
     source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
     hidden: "the range from the center (1 of 3 coordinates)",
     patents: "US 2025/0329045 A1; PCT application declared by its authors",
-    ..Entry::new("ray", Lift::In3d(lift))
+    ..Entry::new("ray", Lift::In3d(|points, key, _| lift(points.positions, key)))
 };
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
@@ -28,9 +26,9 @@ const RESTARTS: usize = 10;
 const MAX_ROUNDS: usize = 300;
 
 /// Ray clouds.
-fn lift(points: &LocalPoints<'_, 3>, key: &Key, _: &SchemeOptions) -> Result<Lifted<3>, Error> {
+fn lift(points: &[[f64; 3]], key: &Key) -> Result<Lifted<3>, Error> {
     let choices = key.stage(Stage::Scheme);
-    from_centers(points.positions, key, |row, _| choices.draws(row as u64).below(2) as usize)
+    from_centers(points, key, |row, _| choices.draws(row as u64).below(2) as usize)
 }
 
 /// Registry entry of `ray-voxel`.
@@ -40,34 +38,27 @@ pub const VOXEL: Entry = Entry {
     rule: "Each point becomes a ray from one of two published centers, by its voxel; seen from there, the rays are a picture of the scene.",
     color: 4,
     patents: "as ray",
-    lift: Lift::In3d(lift_by_voxel),
+    lift: Lift::In3d(|points, key, options| by_voxel(points.positions, key, options.voxel)),
     parameters: |options| vec![("voxel", options.voxel)],
     ..ENTRY
 };
 
 /// Ray clouds, voxel variant.
-fn lift_by_voxel(
-    points: &LocalPoints<'_, 3>,
-    key: &Key,
-    options: &SchemeOptions,
-) -> Result<Lifted<3>, Error> {
-    let voxel = options.voxel;
+fn by_voxel(points: &[[f64; 3]], key: &Key, voxel: f64) -> Result<Lifted<3>, Error> {
     if !(voxel.is_finite() && voxel > 0.0) {
         return Err(Error::new("voxel", "a positive length", voxel));
     }
     // The grid starts half a voxel below the smallest coordinates, as in Open3D.
-    let mut low = [f64::INFINITY; 3];
-    for point in points.positions {
-        low = std::array::from_fn(|c| low[c].min(point[c]));
-    }
-    let start = low.map(|x| x - 0.5 * voxel);
-    from_centers(points.positions, key, |_, point| {
+    let low = |c: usize| points.iter().map(|point| point[c]).fold(f64::INFINITY, f64::min);
+    let start = [0, 1, 2].map(|c| low(c) - 0.5 * voxel);
+    from_centers(points, key, |_, point| {
         let cell = |c: usize| ((point[c] - start[c]) / voxel).floor();
         (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
     })
 }
 
-/// Returns rays from two k-means centers to every point. `choose` returns the center of a row.
+/// Returns rays from two centers to every point: those of the best of several runs of k-means, which depend on
+/// points and `key` alone. `choose` returns the center of a row.
 fn from_centers(
     points: &[[f64; 3]],
     key: &Key,
@@ -76,22 +67,15 @@ fn from_centers(
     if points.len() < 2 {
         return Err(Error::new("points", "at least 2 for two centers", points.len()));
     }
-    rays_from(&two_centers(points, key), points, choose, |rays, _| Ok(rays))
-}
-
-/// Returns the centers of the best of several runs of k-means. They depend on points and `key` alone.
-fn two_centers(points: &[[f64; 3]], key: &Key) -> [[f64; 3]; 2] {
     let run = |restart: usize| lloyd(points, spread_start(points, key, restart as u64));
     let runs = parallel::map(RESTARTS, run);
     // The first of equally good runs counts.
     let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let (_, mut centers) = best.expect("a restart");
     // The order of the centers must not depend on which restart won.
-    centers.sort_unstable_by(|a, b| {
-        let by_axis = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
-        by_axis.fold(Ordering::Equal, Ordering::then)
-    });
-    centers
+    centers.sort_unstable_by(|a, b| a.partial_cmp(b).expect("finite points"));
+    let (rays, hidden, dropped) = rays_from(&centers, points, choose)?;
+    Ok(Lifted { hidden, dropped, ..Lifted::one_each(Obfuscation::Rays(rays)) })
 }
 
 /// Chooses initial centers with k-means++: the second by its squared distance to the first.
@@ -134,14 +118,13 @@ fn lloyd(points: &[[f64; 3]], mut centers: [[f64; 3]; 2]) -> (f64, [[f64; 3]; 2]
     (cost, centers)
 }
 
-/// Returns rays from `centers` to every point, as `finish` changes them. `choose` returns the center of a
-/// row; `finish` receives the original of each ray.
+/// Returns rays from `centers` to every point, the original of each ray, and the points without one. `choose`
+/// returns the center of a row.
 fn rays_from<const D: usize>(
     centers: &[[f64; D]],
     points: &[[f64; D]],
     choose: impl Fn(usize, &[f64; D]) -> usize,
-    finish: impl FnOnce(Rays<D>, &[OriginalId]) -> Result<Rays<D>, Error>,
-) -> Result<Lifted<D>, Error> {
+) -> Result<(Rays<D>, Vec<OriginalId>, Vec<Dropped>), Error> {
     // Rays start at the stored center, which is rounded to `f32`.
     let centers: Vec<[f64; D]> = centers.iter().map(|c| c.map(|x| f64::from(x as f32))).collect();
     let (mut hidden, mut dropped) = (Vec::new(), Vec::new());
@@ -159,8 +142,7 @@ fn rays_from<const D: usize>(
         center.push(chosen as u8);
         direction.push(ray.map(|x| x / length2.sqrt()));
     }
-    let rays = finish(Rays::try_new(&centers, center, &direction)?, &hidden)?;
-    Ok(Lifted { hidden, dropped, ..Lifted::one_each(Obfuscation::Rays(rays)) })
+    Ok((Rays::try_new(&centers, center, &direction)?, hidden, dropped))
 }
 
 /// Registry entry of `dcl2d`.
@@ -171,7 +153,7 @@ pub const DCL2D: Entry = Entry {
     source: "Kim et al., Dual Convergent Lines, CVPR 2026",
     hidden: "the range from the anchor (1 of 2 coordinates)",
     patents: "none found",
-    ..Entry::new("dcl2d", Lift::In2d(dual_convergent))
+    ..Entry::new("dcl2d", Lift::In2d(|points, _, _| dual_convergent(points)))
 };
 
 /// Dual convergent lines: through one of two anchors, chosen by the half of the image.
@@ -184,11 +166,7 @@ pub const DCL2D: Entry = Entry {
 /// - A keypoint on the split belongs to the right half.
 /// - A keypoint on its anchor has no line and is dropped.
 /// - The line reveals its anchor, and so the half. It is therefore released as a ray.
-fn dual_convergent(
-    points: &LocalPoints<'_, 2>,
-    _: &Key,
-    _: &SchemeOptions,
-) -> Result<Lifted<2>, Error> {
+fn dual_convergent(points: &LocalPoints<'_, 2>) -> Result<Lifted<2>, Error> {
     let Some(image) = points.bounds else {
         return Err(Error::new("image size", "known: anchors lie on its border", "none"));
     };
@@ -198,7 +176,9 @@ fn dual_convergent(
     let chosen = |_, point: &[f64; 2]| usize::from(point[0] >= center[0]);
     let (mut first, mut second) = (image, image);
     (first.high[0], second.low[0]) = (center[0], center[0]);
-    rays_from(&anchors, points.positions, chosen, |rays, _| rays.with_regions(vec![first, second]))
+    let (rays, hidden, dropped) = rays_from(&anchors, points.positions, chosen)?;
+    let rays = Obfuscation::Rays(rays.with_regions(vec![first, second])?);
+    Ok(Lifted { hidden, dropped, ..Lifted::one_each(rays) })
 }
 
 /// Share of the points that keep their bearing.
@@ -215,7 +195,7 @@ pub const SPHERE: Entry = Entry {
     hidden: "the range from the center (1 of 3 coordinates)",
     patents: "PCT application declared by its authors",
     parameters: |_| vec![("share of real bearings", KEPT)],
-    ..Entry::new("sphere", Lift::In3d(among_decoys))
+    ..Entry::new("sphere", Lift::In3d(|points, key, _| among_decoys(points.positions, key)))
 };
 
 /// Sphere clouds: the bearing of every point from the center of the map, among decoys.
@@ -227,12 +207,7 @@ pub const SPHERE: Entry = Entry {
 ///
 /// The published code confirms the center and the share. It makes no decoys: the variance of the
 /// noise and the source of a decoy's descriptor are assumptions.
-fn among_decoys(
-    points: &LocalPoints<'_, 3>,
-    key: &Key,
-    _: &SchemeOptions,
-) -> Result<Lifted<3>, Error> {
-    let points = points.positions;
+fn among_decoys(points: &[[f64; 3]], key: &Key) -> Result<Lifted<3>, Error> {
     let n = points.len();
     if n < 2 {
         return Err(Error::new("points", "at least 2", n));
@@ -252,15 +227,9 @@ fn among_decoys(
         let mut draws = noise.draws(1 + u64::from(row));
         direction.map(|x| x + VARIANCE.sqrt() * draws.normal())
     };
-    rays_from(
-        &[center],
-        points,
-        |_, _| 0,
-        |rays, hidden| {
-            let directions: Vec<[f64; 3]> =
-                rays.direction().iter().zip(hidden).map(moved).collect();
-            let centers: Vec<[f64; 3]> = rays.centers().iter().map(widen).collect();
-            Rays::try_new(&centers, rays.center().to_vec(), &directions)
-        },
-    )
+    let (rays, hidden, dropped) = rays_from(&[center], points, |_, _| 0)?;
+    let directions: Vec<[f64; 3]> = rays.direction().iter().zip(&hidden).map(moved).collect();
+    let centers: Vec<[f64; 3]> = rays.centers().iter().map(widen).collect();
+    let rays = Rays::try_new(&centers, rays.center().to_vec(), &directions)?;
+    Ok(Lifted { hidden, dropped, ..Lifted::one_each(Obfuscation::Rays(rays)) })
 }

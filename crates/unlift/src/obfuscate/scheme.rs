@@ -4,12 +4,10 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use super::change::Change;
+use super::changed::Change;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
 use crate::seed::Key;
-#[cfg(doc)]
-use crate::seed::Stage;
 use crate::truth::Dropped;
 use crate::{Error, OriginalId, Unit};
 
@@ -139,7 +137,7 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
 
     /// Hides `points`.
     ///
-    /// All randomness must come from `key` with [`Stage::Scheme`], because these draws are
+    /// All randomness must come from `key` with [`Stage::Scheme`](crate::seed::Stage::Scheme), because these draws are
     /// released. Every original must be in exactly one slot, or dropped with a reason.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ mod room;
 mod sampling;
 mod surfaces;
 
+use crate::geometry::vector::sub;
 use crate::seed::{Draws, Stage};
 use surfaces::{rotate, turn};
 
@@ -41,11 +42,8 @@ pub fn room(seed: u64, n_points: usize) -> Room {
 
     let middle = [0.5 * scene.size[0], 0.5 * scene.size[1], 0.0];
     let yaw = turn(HALF_YAW_TANGENT);
-    let in_frame =
-        |p: [f64; 3]| rotate(yaw, [p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]]);
-    for point in &mut points {
-        *point = in_frame(*point);
-    }
+    let in_frame = |p: [f64; 3]| rotate(yaw, sub(&p, &middle));
+    points.iter_mut().for_each(|point| *point = in_frame(*point));
     for camera in &mut cameras {
         camera.center = in_frame(camera.center);
         camera.look = rotate(yaw, camera.look);
@@ -54,7 +52,6 @@ pub fn room(seed: u64, n_points: usize) -> Room {
 }
 
 /// Purpose of a stream of random numbers.
-#[derive(Clone, Copy)]
 enum Purpose {
     Layout = 0,
     Texture = 1,

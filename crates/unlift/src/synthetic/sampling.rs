@@ -19,10 +19,8 @@ const MOST_TRIES: usize = 10_000;
 
 /// Returns `n` points in random order: copies, outliers, and points on surfaces.
 pub(super) fn points(seed: u64, n: usize, scene: &Scene, cameras: &[Camera]) -> Vec<[f64; 3]> {
-    // A single point has no other to copy.
     let share = |share: f64| (n as f64 * share).round() as usize;
-    let (n_copies, n_outliers) =
-        (if n < 2 { 0 } else { share(COINCIDENT_SHARE) }, share(OUTLIER_SHARE));
+    let (n_copies, n_outliers) = (share(COINCIDENT_SHARE), share(OUTLIER_SHARE));
     let sources = sources(seed, scene);
     let mut points: Vec<[f64; 3]> = (0..n - n_copies)
         .map(|i| {

@@ -1,4 +1,5 @@
-//! Properties of attacks on the records alone, in addition to those of degenerate maps.
+//! Properties of attacks on the records alone, in addition to those of degenerate maps. Rooms are furnished, because these attacks
+//! depend on density.
 
 use unlift::neighbors::geometric;
 
@@ -11,16 +12,11 @@ fn alone<const D: usize>(released: &Released<D>, solver: Builtin) -> Recovered<D
     solve(released, &lists, (solver, RecoverOptions::default()))
 }
 
-/// Returns a furnished room, because these attacks depend on density.
-fn furnished(n: usize) -> Vec<[f64; 3]> {
-    synthetic::room(1, n).points
-}
-
 /// Floors are shares within 25 cm, at most two points below the measured ones.
 #[test]
 fn a_room_comes_back_from_its_records() {
     use Builtin::{Density, Tomography};
-    let points = furnished(4000);
+    let points = synthetic::room(1, 4000).points;
     for (name, solver, least) in [
         ("olc", Density, 59.8),
         ("olc", Tomography, 70.6),
@@ -39,7 +35,7 @@ fn a_room_comes_back_from_its_records() {
 /// A map in other units has the same shares.
 #[test]
 fn a_scaled_map_has_the_same_shares() {
-    let points = furnished(1500);
+    let points = synthetic::room(1, 1500).points;
     let scaled: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| 7.3 * x)).collect();
     for name in ["olc", "ppl", "ray", "cp"] {
         for solver in ALONE {
@@ -58,7 +54,7 @@ fn a_scaled_map_has_the_same_shares() {
 /// Records in another order give the same positions in that order.
 #[test]
 fn permuted_records_give_permuted_positions() {
-    let released = hide::<3>(entry("olc"), &furnished(1000), 1).released;
+    let released = hide::<3>(entry("olc"), &synthetic::room(1, 1000).points, 1).released;
     let order = Draws::new(1, Stage::Shuffle, 9).permutation(1000);
     let permuted = released_of(&released, released.obfuscation().select(&order));
     for solver in ALONE {
@@ -73,7 +69,7 @@ fn permuted_records_give_permuted_positions() {
 /// Lists contain far more neighbors than by chance, are full, and exclude rays of the same center.
 #[test]
 fn geometric_lists_hold_neighbors() {
-    let points = furnished(3000);
+    let points = synthetic::room(1, 3000).points;
     for (name, least) in [("olc", 0.42), ("ppl", 0.37), ("ray", 0.14), ("cp", 0.112)] {
         let hidden = hide(entry(name), &points, 1);
         let lists = geometric(&hidden.released, 20).unwrap();
@@ -92,7 +88,7 @@ fn geometric_lists_hold_neighbors() {
 
 #[test]
 fn where_records_alone_tell_nothing_the_error_says_so() {
-    let planes = hide::<3>(entry("plane"), &furnished(200), 1).released;
+    let planes = hide::<3>(entry("plane"), &synthetic::room(1, 200).points, 1).released;
     let flat = hide::<2>(entry("lines2d"), &room(1, 100), 1).released;
     for (error, line) in [
         (geometric(&planes, 5).unwrap_err(), "lines, rays or axis candidates, found planes"),
@@ -100,7 +96,7 @@ fn where_records_alone_tell_nothing_the_error_says_so() {
     ] {
         assert_eq!(error.to_string(), format!("geometric neighborhoods: expected {line}"));
     }
-    let candidates = hide::<3>(entry("cp"), &furnished(200), 1).released;
+    let candidates = hide::<3>(entry("cp"), &synthetic::room(1, 200).points, 1).released;
     let [density, tomography] = ALONE;
     for (map, solver) in [(&planes, density), (&planes, tomography), (&candidates, density)] {
         assert!(alone(map, solver).status().iter().all(|&s| s == Status::NoSupport));

@@ -4,13 +4,6 @@ use unlift::evaluate::{Reliability, reliability};
 
 use crate::maps::*;
 
-/// Returns a room and its median distance to the 50th neighbor.
-fn scene(seed: u64, n: usize) -> (Vec<[f64; 3]>, f64) {
-    let points = synthetic::room(seed, n).points;
-    let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
-    (points, typical)
-}
-
 const CASES: [(Noise, f64); 5] = [
     (Noise::Uniform, 1.0),
     (Noise::Uniform, 0.2),
@@ -21,7 +14,8 @@ const CASES: [(Noise, f64); 5] = [
 
 #[test]
 fn what_is_said_comes_true_as_often_as_said() {
-    let (points, typical) = scene(207, 6_000);
+    let points = synthetic::room(207, 6_000).points;
+    let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
     let mut all: Option<Reliability> = None;
     for name in ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"] {
         let hidden = try_hide(entry(name), &points, 5.0 * typical, 7).unwrap();
@@ -54,7 +48,7 @@ fn what_is_said_comes_true_as_often_as_said() {
 /// Regression: with lists from a file, 68 % of Castle's `ray` were sure, and 59 % of these correct.
 #[test]
 fn lists_that_do_not_come_from_the_oracle_say_nothing_about_certainty() {
-    let hidden = hide(entry("olc"), &scene(3, 3_000).0, 7);
+    let hidden = hide(entry("olc"), &synthetic::room(3, 3_000).points, 7);
     let lists = hidden.lists(20, 0.5, 7);
     let about = About { by_oracle: false, ..lists.about() };
     let recovered = solve(&hidden.released, &lists.with_about(about), joint());

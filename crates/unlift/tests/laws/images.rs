@@ -15,23 +15,12 @@ fn image_of(name: &str, points: Vec<[f64; 2]>) -> Item<2> {
     Item { descriptors: Some(descriptors), ..image(name, points, SIZE) }
 }
 
-/// Returns keypoints in clusters; `twins` percent have a second keypoint at the same place.
-fn keypoints(seed: u64, n: usize, twins: u64) -> Vec<[f64; 2]> {
-    let mut draws = Draws::new(seed, Stage::Synthetic, 0);
-    let mut points: Vec<[f64; 2]> = Vec::new();
-    while points.len() < n {
-        let center: [f64; 2] = std::array::from_fn(|c| draws.between(0.1, 0.9) * SIZE[c]);
-        for _ in 0..12 {
-            let at = |c: usize, x: f64| (center[c] + 12.0 * x).clamp(0.0, SIZE[c]);
-            let point = [at(0, draws.normal()), at(1, draws.normal())];
-            points.push(point);
-            if draws.below(100) < twins {
-                points.push(point);
-            }
-        }
-    }
-    points.truncate(n);
-    points
+/// Returns keypoints in clusters of twelve; of the first ones, `twins` have a second keypoint at the same place.
+fn keypoints(seed: u64, n: usize, twins: usize) -> Vec<[f64; 2]> {
+    let mut points: Vec<[f64; 2]> = piles(seed, n.div_ceil(12), 12, 0.3);
+    points.truncate(n - twins);
+    points.extend_from_within(..twins);
+    points.iter().map(|point| point.map(|x| 20.0 + 45.0 * x)).collect()
 }
 
 fn run(
@@ -72,7 +61,7 @@ impl Watcher<2> for Each {
 fn rows_are_pooled_over_keypoints() {
     let plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.5], &[Builtin::Joint]);
     let plan = Plan { repeats: 2, ..plan };
-    let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];
+    let images = [image_of("a", keypoints(1, 300, 50)), image_of("b", keypoints(2, 150, 0))];
     let mut each = Each::default();
     let pooled = run(&images, &plan, &mut each).unwrap().rows;
     for (at, row) in pooled.iter().enumerate() {
@@ -130,17 +119,16 @@ fn images_with_few_keypoints_are_attacked() {
 /// counted, if necessary as lost. An observer receives every row of every image when it is finished, not only when the next images begin.
 #[test]
 fn images_with_hardly_any_keypoints_are_counted() {
-    let line = |n: usize| (0..n).map(|i| [10.0 + 3.0 * i as f64, 50.0]).collect();
     let images = [
         image_of("none", Vec::new()),
         image_of("one", vec![[5.0, 6.0]]),
         image_of("two", vec![[5.0, 6.0], [7.0, 6.0]]),
         image_of("twenty", keypoints(3, 20, 0)),
-        image_of("a few more", keypoints(4, 23, 30)),
+        image_of("a few more", keypoints(4, 23, 5)),
         image_of("one place", vec![[33.0, 44.0]; 50]),
         image_of("upright", (0..60).map(|i| [160.0, 2.0 + 3.0 * f64::from(i)]).collect()),
-        image_of("one line", line(60)),
-        image_of("enough", keypoints(5, 200, 20)),
+        image_of("one line", (0..60).map(|i| [10.0 + 3.0 * f64::from(i), 50.0]).collect()),
+        image_of("enough", keypoints(5, 200, 30)),
     ];
     let mut plan = maps::plan(Unit::Pixel, &[], &[1.0, 0.1], &Builtin::FROM_LISTS);
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));

@@ -17,7 +17,6 @@ mod architecture;
 mod audit;
 mod confidence;
 mod degenerate;
-mod extremes;
 mod gauge;
 mod golden;
 mod images;

@@ -124,11 +124,6 @@ impl<const D: usize> Hidden<D> {
         (0..n).map(row).collect()
     }
 
-    /// Returns the distance of `point` (relative to the origin) to the feasible set of `record`.
-    pub fn distance(&self, record: usize, point: &[f64; D]) -> f64 {
-        distance_to_record(self.released.obfuscation(), record, point)
-    }
-
     /// Returns the distance of the position of `slot` to its original; NaN if it is lost.
     pub fn error(&self, recovered: &Recovered<D>, slot: usize) -> f64 {
         distance(&widen(&recovered.positions()[slot]), &self.local(slot))
@@ -165,15 +160,8 @@ pub fn everyone(n_records: usize, slots_per_record: usize) -> Neighborhoods {
 pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> Neighborhoods {
     let (n, per) = (hidden.released.n_records(), hidden.released.slots_per_record());
     let row = |slot: usize| {
-        let mut draws = Draws::new(seed, Stage::Synthetic, slot as u64);
-        let mut row: Vec<u32> = Vec::new();
-        while row.len() < k {
-            let record = draws.below(n as u64) as u32;
-            if record as usize != slot / per && !row.contains(&record) {
-                row.push(record);
-            }
-        }
-        row
+        let order = Draws::new(seed, Stage::Synthetic, slot as u64).permutation(n);
+        order.into_iter().filter(|&record| record as usize != slot / per).take(k).collect()
     };
     hidden.lists_of(&(0..hidden.released.n_slots()).map(row).collect::<Vec<_>>())
 }

@@ -33,8 +33,7 @@ fn rank_from(of: &Hidden<3>, slot: usize) -> impl Fn(&RecordId) -> usize {
 
 #[test]
 fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
-    for scheme in SCHEMES {
-        let hidden = hidden(scheme);
+    for hidden in SCHEMES.map(hidden) {
         let near = hidden.near(K);
         let full = near.at_inlier_ratio(1.0, 3).unwrap();
         let split = |lists: &Neighborhoods, slot: usize| -> [BTreeSet<RecordId>; 2] {
@@ -64,8 +63,7 @@ fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
 
 #[test]
 fn near_outliers_lie_between_the_2k_th_and_the_10k_th_nearest() {
-    for scheme in SCHEMES {
-        let hidden = hidden(scheme);
+    for hidden in SCHEMES.map(hidden) {
         let lists = hidden.noisy_lists(K, (Noise::Near, 0.0), 1).unwrap();
         let mut ranks = BTreeSet::new();
         for slot in (0..lists.n_slots()).step_by(37) {
@@ -82,8 +80,7 @@ fn near_outliers_lie_between_the_2k_th_and_the_10k_th_nearest() {
 
 #[test]
 fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
-    for scheme in SCHEMES {
-        let hidden = hidden(scheme);
+    for hidden in SCHEMES.map(hidden) {
         let nearest = hidden.lists(K, 1.0, 2);
         let per = hidden.released.slots_per_record();
         let lists = |noise: Noise| hidden.noisy_lists(K, (noise, 0.0), 2).unwrap();

@@ -1,4 +1,4 @@
-//! Properties of released maps: normal form, keys, and which truth belongs to a map. Others are in
+//! Properties of released maps: normal form, keys, decoys, and which truth belongs to a map. Others are in
 //! `unlift_testkit::scheme_laws`.
 
 use crate::maps::*;
@@ -36,6 +36,24 @@ fn a_truth_belongs_to_its_map_alone() {
             assert!(hide(entry(name), &together, 6).truth().belongs().is_ok(), "{name}");
         }
     }
+}
+
+#[test]
+fn true_neighbors_tell_decoys() {
+    let points = synthetic::room(1, 600).points;
+    let figures = |scheme: &str| {
+        let hidden = hide(entry(scheme), &points, 0);
+        hidden.truth().bearings(&hidden.lists(12, 1.0, 0))
+    };
+    let of_sphere = figures("sphere");
+    let of = |name: &str| of_sphere.iter().find(|(known, _)| known == name).unwrap().1;
+    assert!((of("real_bearings_percent") - 100.0 / 3.0).abs() < 0.2);
+    // Twelve neighbors among 600 points cover a wider angle than the attack expects.
+    assert!(of("decoys_area") > 0.75, "{of_sphere:?}");
+    assert!(of("decoys_precision_percent") > 80.0, "{of_sphere:?}");
+    assert!(of("decoys_recall_percent") > 60.0, "{of_sphere:?}");
+    // Lines are no bearings.
+    assert_eq!(figures("olc"), []);
 }
 
 /// Guesses integer keys, which the first line confirms. Returns the file row of every record.

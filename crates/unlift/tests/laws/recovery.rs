@@ -41,7 +41,8 @@ fn fixed_by<const D: usize>(
             let published = widen(&candidates.position()[own]);
             let off = distance(&published, &hidden.local(slot));
             // Neighbors exchanged on the same axis agree with the published point, too.
-            let there = listed().filter(|&r| hidden.distance(r, &published) <= 2.0 * delta).count();
+            let away = |other| distance_to_record(hidden.released.obfuscation(), other, &published);
+            let there = listed().filter(|&other| away(other) <= 2.0 * delta).count();
             let clear = off > 2.0 * delta && 3 * there <= listed().count();
             (listed().count() >= least && clear).then_some(1.0)
         }
@@ -154,7 +155,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             is_far(s)
                 && record != slot / per
                 && !with[slot].contains(&(record as u32))
-                && hidden.distance(record, &result) > 20.0 * DELTA
+                && distance_to_record(hidden.released.obfuscation(), record, &result) > 20.0 * DELTA
         });
         if let Some(stranger) = stranger {
             with[slot].push((stranger / per) as u32);

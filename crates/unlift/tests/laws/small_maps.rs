@@ -63,11 +63,7 @@ fn joint_recovery_keeps_what_its_first_pass_found() {
 fn cp(points: &[[f64; 3]], delta: Delta) -> f64 {
     let (hidden, options) = (hide(entry("cp"), points, 0), RecoverOptions { delta, ..joint().1 });
     let recovered = solve(&hidden.released, &hidden.lists(10, 0.3, 0), (Builtin::Joint, options));
-    let off = |(slot, position): (usize, &[f32; 3])| {
-        distance(&position.map(f64::from), &hidden.local(slot))
-    };
-    let near = recovered.positions().iter().enumerate().map(off).filter(|&off| off <= 0.25);
-    100.0 * near.count() as f64 / points.len() as f64
+    hidden.percent_within(&recovered, 0.25)
 }
 
 /// Regression: exchanged coordinates agree with partners at any delta. On a few hundred points

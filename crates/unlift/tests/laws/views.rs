@@ -13,14 +13,12 @@ const N: usize = 900;
 const EXTENT: f64 = 6.0;
 
 fn points() -> Vec<[f64; 3]> {
-    let mut draws = Draws::new(5, Stage::Synthetic, 0);
-    (0..N).map(|_| [EXTENT, 4.0, 2.6].map(|side| draws.between(0.0, side))).collect()
+    uniform(5, N)
 }
 
 /// Releases points with the first rows of the same descriptors.
 fn release<const D: usize>(name: &str, original: &Original<D>, seed: u64) -> Hidden<D> {
-    let rows: Vec<u32> = (0..original.len() as u32).collect();
-    let descriptors = random_descriptors(6, N, 16).select(&rows);
+    let descriptors = random_descriptors(6, original.len(), 16);
     let (scheme, key) = (entry(name), Key::from_seed(seed));
     let (released, secret) = obfuscate(scheme, original, Some(&descriptors), &key).unwrap();
     Hidden { original: original.clone(), released, secret }
