@@ -1,5 +1,7 @@
 //! Descriptors: one row per hidden point. Every geometric obfuscation releases them unchanged.
 
+use std::ops::Range;
+
 use crate::Error;
 
 /// Largest number of columns, so that a sum of squares of bytes fits 32 bits.
@@ -74,6 +76,12 @@ impl Descriptors {
         self.dim
     }
 
+    /// The range of row `at` in the values.
+    #[inline]
+    pub(crate) fn range(&self, at: usize) -> Range<usize> {
+        at * self.dim..(at + 1) * self.dim
+    }
+
     /// All values, row-major `(rows, dim)`.
     pub fn values(&self) -> &Values {
         &self.values
@@ -84,16 +92,10 @@ impl Descriptors {
     /// # Panics
     /// When an index is out of range.
     pub fn select(&self, order: &[u32]) -> Self {
-        fn rows<T: Copy>(values: &[T], dim: usize, order: &[u32]) -> Vec<T> {
-            let mut selected = Vec::with_capacity(order.len() * dim);
-            for &row in order {
-                selected.extend_from_slice(&values[row as usize * dim..(row as usize + 1) * dim]);
-            }
-            selected
-        }
+        let rows = order.iter().map(|&row| self.range(row as usize));
         let values = match &self.values {
-            Values::U8(v) => Values::U8(rows(v, self.dim, order)),
-            Values::F32(v) => Values::F32(rows(v, self.dim, order)),
+            Values::U8(v) => Values::U8(rows.map(|row| &v[row]).collect::<Vec<_>>().concat()),
+            Values::F32(v) => Values::F32(rows.map(|row| &v[row]).collect::<Vec<_>>().concat()),
         };
         Self { values, dim: self.dim }
     }
@@ -101,19 +103,18 @@ impl Descriptors {
     /// Copies row `at` to `row`, which has one value per column.
     #[inline]
     pub fn read_row(&self, at: usize, row: &mut [f32]) {
-        let range = at * self.dim..(at + 1) * self.dim;
+        let at = self.range(at);
         match &self.values {
-            Values::U8(v) => row.iter_mut().zip(&v[range]).for_each(|(x, &v)| *x = f32::from(v)),
-            Values::F32(v) => row.copy_from_slice(&v[range]),
+            Values::U8(v) => row.iter_mut().zip(&v[at]).for_each(|(x, &v)| *x = f32::from(v)),
+            Values::F32(v) => row.copy_from_slice(&v[at]),
         }
     }
 
     /// Whether row `at` has only zeros, as exporters and `drop` mark a missing descriptor.
     pub fn is_zero(&self, at: usize) -> bool {
-        let range = at * self.dim..(at + 1) * self.dim;
         match &self.values {
-            Values::U8(v) => v[range].iter().all(|&x| x == 0),
-            Values::F32(v) => v[range].iter().all(|&x| x == 0.0),
+            Values::U8(v) => v[self.range(at)].iter().all(|&x| x == 0),
+            Values::F32(v) => v[self.range(at)].iter().all(|&x| x == 0.0),
         }
     }
 
@@ -131,19 +132,14 @@ impl Descriptors {
     /// Returns the squared Euclidean distance between rows `a` and `b`.
     #[inline]
     pub fn squared_distance(&self, a: usize, b: usize) -> f32 {
-        let dim = self.dim;
+        let (a, b) = (self.range(a), self.range(b));
         match &self.values {
             Values::U8(v) => {
-                let (x, y) = (&v[a * dim..(a + 1) * dim], &v[b * dim..(b + 1) * dim]);
                 // Fits 32 bits, see MOST_COLUMNS.
                 let square = |(&x, &y): (&u8, &u8)| u32::from(x.abs_diff(y)).pow(2);
-                let sum: u32 = x.iter().zip(y).map(square).sum();
-                sum as f32
+                v[a].iter().zip(&v[b]).map(square).sum::<u32>() as f32
             }
-            Values::F32(v) => {
-                let (x, y) = (&v[a * dim..(a + 1) * dim], &v[b * dim..(b + 1) * dim]);
-                x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum()
-            }
+            Values::F32(v) => v[a].iter().zip(&v[b]).map(|(x, y)| (x - y) * (x - y)).sum(),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! The error of the library, an argument with a wrong value, and text of unknown origin as one harmless line.
 
-use std::fmt;
-use std::fmt::{Display, Write};
+use std::fmt::{self, Display, Write};
 
 /// The kind of an [`Error`], for callers that handle some kinds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -65,42 +65,42 @@ impl ProtectedDescriptors {
         public: Option<Arc<Descriptors>>,
         bytes: bool,
     ) -> Result<Self, Error> {
-        let wrong =
-            |expected: String, found: usize| Error::new("protected descriptors", expected, found);
+        let wrong = |expected: String, found: usize| {
+            Err(Error::new("protected descriptors", expected, found))
+        };
         let (Rule::Subspace { m } | Rule::Words { m, .. }) = rule;
         let least = if matches!(rule, Rule::Words { .. }) { m } else { m + 1 };
         let width = rows.first().map_or(least, Vec::len);
         if let Some(at) =
             rows.iter().position(|row| row.len() != width || row.iter().any(|x| !x.is_finite()))
         {
-            return Err(wrong(format!("{width} finite values per row"), at));
+            return wrong(format!("{width} finite values per row"), at);
         }
         // Few rows may be equal, such as sets of words.
         let rows = Descriptors::unchecked(Values::F32(rows.concat()), width.max(1));
-        match (rule, &public) {
-            (Rule::Subspace { m }, _) if m == 0 || m > MOST_DIRECTIONS => {
-                return Err(wrong(format!("1 to {MOST_DIRECTIONS} directions"), m));
+        match rule {
+            Rule::Subspace { m } => {
+                if !(1..=MOST_DIRECTIONS).contains(&m) {
+                    return wrong(format!("1 to {MOST_DIRECTIONS} directions"), m);
+                }
+                if !rows.dim().is_multiple_of(m + 1) {
+                    return wrong(format!("a multiple of {} values per row", m + 1), rows.dim());
+                }
+                let (dim, known) = (rows.dim() / (m + 1), public.as_ref().map(|all| all.dim()));
+                if let Some(known) = known.filter(|&known| !rows.is_empty() && known != dim) {
+                    return wrong(format!("directions of {known} values"), dim);
+                }
             }
-            (Rule::Subspace { m }, _) if !rows.dim().is_multiple_of(m + 1) => {
-                return Err(wrong(format!("a multiple of {} values per row", m + 1), rows.dim()));
-            }
-            (Rule::Subspace { m }, Some(public))
-                if !rows.is_empty() && rows.dim() / (m + 1) != public.dim() =>
-            {
-                let expected = format!("directions of {} values", public.dim());
-                return Err(wrong(expected, rows.dim() / (m + 1)));
-            }
-            (Rule::Words { m, .. }, _) if rows.dim() != m => {
-                return Err(wrong(format!("{m} words per row"), rows.dim()));
-            }
-            (Rule::Words { .. }, public) => {
+            Rule::Words { m, .. } => {
+                if rows.dim() != m {
+                    return wrong(format!("{m} words per row"), rows.dim());
+                }
                 let n = public.as_ref().map_or(0, |words| words.len());
                 let mut words = rows.rows().flatten();
                 if let Some(word) = words.find(|word| !(0.0..n as f32).contains(word)) {
-                    return Err(wrong(format!("words below {n}"), word as usize));
+                    return wrong(format!("words below {n}"), word as usize);
                 }
             }
-            _ => {}
         }
         Ok(Self { rule, rows, public, bytes, guess: OnceLock::new() })
     }
@@ -127,10 +127,9 @@ impl ProtectedDescriptors {
 
     /// Number of values of a plain descriptor.
     pub fn dim(&self) -> usize {
-        match (self.rule, &self.public) {
-            (Rule::Subspace { m }, _) => self.rows.dim() / (m + 1),
-            (Rule::Words { .. }, Some(words)) => words.dim(),
-            (Rule::Words { .. }, None) => 0,
+        match self.rule {
+            Rule::Subspace { m } => self.rows.dim() / (m + 1),
+            Rule::Words { .. } => self.public().map_or(0, Descriptors::dim),
         }
     }
 

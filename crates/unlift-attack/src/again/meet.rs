@@ -2,8 +2,7 @@
 
 use crate::geometry::vector::{along, cross, dot, sub};
 use crate::parallel;
-use crate::simd;
-use crate::simd::Kernel;
+use crate::simd::{self, Kernel};
 
 /// A line, or a half-line from `point`.
 #[derive(Clone, Copy, Debug)]
@@ -153,12 +152,9 @@ const MOST: f64 = 0.1;
 ///
 /// Distances of wrong links are exponential, those of right ones are Cauchy's. Scale and share are learned (expectation maximization).
 pub(super) fn trust(distances: &[f64]) -> (Vec<f64>, f64) {
-    if distances.is_empty() {
-        return (Vec::new(), LEAST);
-    }
     let mut sorted = distances.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    let mut scale = sorted[sorted.len() / 10].max(LEAST);
+    let mut scale = sorted.get(sorted.len() / 10).map_or(LEAST, |first| first.max(LEAST));
     let mut share = 0.5;
     let mut found = vec![0.0; distances.len()];
     for _ in 0..ROUNDS {

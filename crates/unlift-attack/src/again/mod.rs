@@ -34,8 +34,9 @@ pub struct Solved {
 const ROUNDING: f64 = 2.4e-7;
 
 /// The records of a release in the frame of the first one.
+#[derive(Default)]
 struct Flats {
-    /// Lines of all records, `per_record` each; three for a point with a swapped coordinate.
+    /// Lines of all records, `per_record` each; three for a point with a swapped coordinate, none for a plane.
     lines: Vec<Line>,
     per_record: usize,
     /// Axis and coordinate of each plane.
@@ -55,32 +56,29 @@ impl Flats {
             let d = widen(d);
             Line { point: moved(p), direction: d.map(|x| x / dot(&d, &d).sqrt()), is_ray }
         };
-        let (mut planes, mut swapped) = (Vec::new(), Vec::new());
-        let mut per_record = 1;
-        let lines = match records {
+        let empty = Self { shift, ..Self::default() };
+        match records {
             Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
-                (0..records.len()).filter_map(|record| records.line(record)).map(line).collect()
+                let lines = (0..records.len()).filter_map(|record| records.line(record));
+                Self { lines: lines.map(line).collect(), per_record: 1, ..empty }
             }
             Obfuscation::AxisPlanes(of) => {
                 let rows = of.axis().iter().zip(of.offset());
                 let plane = |(&axis, &offset): (&u8, &f32)| {
                     (usize::from(axis), f64::from(offset) + shift[usize::from(axis)])
                 };
-                planes = rows.map(plane).collect();
-                per_record = 0;
-                Vec::new()
+                Self { planes: rows.map(plane).collect(), ..empty }
             }
             Obfuscation::AxisCandidates(of) => {
-                swapped = of.position().iter().map(moved).collect();
-                per_record = 3;
+                let swapped: Vec<[f64; 3]> = of.position().iter().map(moved).collect();
                 let axes = |&point: &[f64; 3]| {
                     let along = |axis| [0, 1, 2].map(|c| if c == axis { 1.0 } else { 0.0 });
                     [0, 1, 2].map(|axis| Line { point, direction: along(axis), is_ray })
                 };
-                swapped.iter().flat_map(axes).collect()
+                let lines = swapped.iter().flat_map(axes).collect();
+                Self { lines, per_record: 3, swapped, ..empty }
             }
-        };
-        Self { lines, per_record, planes, swapped, shift }
+        }
     }
 
     /// Returns the size that few swapped coordinates exceed.
@@ -210,9 +208,9 @@ pub fn by_geometry(a: &Released<3>, b: &Released<3>) -> Result<Solved, Error> {
             let Some(meet) = of_a.lines[own as usize].meet(&of_b.lines[other as usize]) else {
                 continue;
             };
-            let axis = if of_a.per_record > 1 { own as usize % 3 } else { 0 };
             let (row, partner) = (record * slots[0] + slot, partner as u32);
-            let (place, unusual) = (Place::of(&meet, axis), Some(miss / usual));
+            let place = Place::of(&meet, own as usize % of_a.per_record);
+            let unusual = Some(miss / usual);
             linked.push(Linked { row, partner, place, unusual, by_descriptor: 0.0 });
         }
     }
@@ -269,9 +267,9 @@ fn places([a, b]: &[Flats; 2], records: &[(usize, usize)]) -> Vec<Place> {
     };
     let place = |&(own, other): &(usize, usize)| match (a.planes.get(own), b.planes.get(other)) {
         (None, None) => {
+            // The only line of a record, or one along each axis.
             let nearest = meet::nearest(a.of(own), b.of(other));
-            let axis = |line: usize| if a.per_record > 1 { line } else { 0 };
-            nearest.map_or(Place::NONE, |(line, meet)| Place::of(&meet, axis(line)))
+            nearest.map_or(Place::NONE, |(line, meet)| Place::of(&meet, line))
         }
         (Some(plane), None) => on_plane(plane, b, other),
         (None, Some(plane)) => on_plane(plane, a, own),

@@ -81,7 +81,11 @@ pub(super) fn solve(
     for (values, is_second) in [(a, false), (b, true)] {
         pin(&mut nodes, values, is_second, same);
     }
-    spread(&mut nodes, &equal);
+    let mut decided: Vec<usize> =
+        (0..nodes.len()).filter(|&at| nodes[at].first.is_some()).collect();
+    while let Some(at) = decided.pop() {
+        spread(&mut nodes, &equal, at, &mut decided);
+    }
     let chosen = by_density(&mut nodes, &equal);
     let mut places: Vec<Place> = nodes.iter().zip(&chosen).map(place).collect();
     cycles.iter().for_each(|cycle| inner(cycle, &nodes, &mut places));
@@ -170,16 +174,13 @@ fn pin(nodes: &mut [Node], released: &[[f64; 3]], is_second: bool, same: f64) {
     }
 }
 
-/// Spreads answers to all nodes that depend on a known one.
-fn spread(nodes: &mut [Node], equal: &[Vec<(usize, bool)>]) {
-    let mut open: Vec<usize> = (0..nodes.len()).filter(|&at| nodes[at].first.is_some()).collect();
-    while let Some(at) = open.pop() {
-        let Some(first) = nodes[at].first else { continue };
-        for &(other, opposite) in &equal[at] {
-            if nodes[other].first.is_none() {
-                nodes[other].first = Some(first != opposite);
-                open.push(other);
-            }
+/// Decides the open nodes that depend directly on the decided node `at`, and adds them to `decided`.
+fn spread(nodes: &mut [Node], equal: &[Vec<(usize, bool)>], at: usize, decided: &mut Vec<usize>) {
+    let Some(first) = nodes[at].first else { return };
+    for &(other, opposite) in &equal[at] {
+        if nodes[other].first.is_none() {
+            nodes[other].first = Some(first != opposite);
+            decided.push(other);
         }
     }
 }
@@ -188,9 +189,6 @@ fn spread(nodes: &mut [Node], equal: &[Vec<(usize, bool)>]) {
 fn by_density(nodes: &mut [Node], equal: &[Vec<(usize, bool)>]) -> Vec<f64> {
     let mut chosen = vec![1.0; nodes.len()];
     let open = |node: &Node| node.is_end() && node.first.is_none();
-    if !nodes.iter().any(open) {
-        return chosen;
-    }
     let both = |node: &Node| [true, false].map(|first| node.point(first).0);
     let answers = nodes.iter().filter(|node| node.is_end()).flat_map(|node| match node.first {
         Some(first) => vec![node.point(first).0],
@@ -210,20 +208,14 @@ fn by_density(nodes: &mut [Node], equal: &[Vec<(usize, bool)>]) -> Vec<f64> {
         nodes[root].first = Some(true);
         let (mut group, mut at) = (vec![root], 0);
         while at < group.len() {
-            let Some(first) = nodes[group[at]].first else { break };
-            for &(other, opposite) in &equal[group[at]] {
-                if nodes[other].first.is_none() {
-                    nodes[other].first = Some(first != opposite);
-                    group.push(other);
-                }
-            }
+            spread(nodes, equal, group[at], &mut group);
             at += 1;
         }
-        let gain = |sparse: &mut dyn FnMut([f64; 3]) -> f64, node: &Node| {
-            let first = node.first == Some(true);
+        let gain = |&at: &usize| {
+            let (node, first) = (&nodes[at], nodes[at].first == Some(true));
             sparse(node.point(!first).0) - sparse(node.point(first).0)
         };
-        let gains: f64 = group.iter().map(|&at| gain(&mut sparse, &nodes[at])).sum();
+        let gains: f64 = group.iter().map(gain).sum();
         for &at in &group {
             nodes[at].first = nodes[at].first.map(|first| first == (gains >= 0.0));
             chosen[at] = 1.0 / (1.0 + libm::exp(-gains.abs()));

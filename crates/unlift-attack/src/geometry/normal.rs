@@ -15,12 +15,11 @@ pub fn local_normal(
     }
     // A tolerance of 0 is not always reached, depending on rounding.
     let eigen = SymmetricEigen::try_new(spread, f64::EPSILON, 100)?;
-    let order = |a: &usize, b: &usize| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]);
-    let least = (0..3).min_by(order)?;
-    let most = (0..3).max_by(order)?;
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let [least, second, most] = axes;
     // Points on a line or at one place have no normal.
-    let second = 3 - least - most;
-    if least == most || eigen.eigenvalues[second] <= eigen.eigenvalues[most] * 1e-12 {
+    if eigen.eigenvalues[second] <= eigen.eigenvalues[most] * 1e-12 {
         return None;
     }
     let column = eigen.eigenvectors.column(least);

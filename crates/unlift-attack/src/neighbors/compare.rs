@@ -153,20 +153,16 @@ impl Compared {
         let record = |row: u32| rows.records[row as usize];
         let mut by_record: Vec<u32> = (0..rows.len() as u32).collect();
         by_record.sort_by_key(|&row| record(row));
-        let mut uncounted = Vec::new();
+        let mut mates: Vec<Vec<u32>> = vec![Vec::new(); rows.len()];
         for rows in by_record.chunk_by(|&a, &b| record(a) == record(b)) {
             for &a in rows {
                 let others = rows.iter().filter(|&&b| b != a);
-                uncounted.extend(others.map(|&b| (a, own[b as usize])));
+                mates[a as usize] = others.map(|&b| own[b as usize]).collect();
             }
         }
         let mut found: Vec<Row> = own.iter().map(|&at| self.rows[at as usize].clone()).collect();
         if self.counts {
-            for (&(row, _), score) in uncounted.iter().zip(self.scores(likeness, &own, &uncounted))
-            {
-                found[row as usize].uncount(score, L::STEP);
-            }
-            self.uncount(likeness, &absent, &own, &mut found);
+            self.uncount(likeness, &own, (&absent, &mates), &mut found);
         }
         let finish = |at: usize| {
             let mut row = found[at].clone();
@@ -186,38 +182,41 @@ impl Compared {
         likeness.block(&self.descriptors, &slots)
     }
 
-    /// Takes back the scores of `rows`, whose places here are `own`, with those at `absent`.
-    fn uncount<L: Likeness>(&self, likeness: &L, absent: &[u32], own: &[u32], rows: &mut [Row]) {
+    /// Takes back the scores of `rows`, whose places here are `own`, with those at `absent`, and those of each row with its `mates`.
+    fn uncount<L: Likeness>(
+        &self,
+        likeness: &L,
+        own: &[u32],
+        (absent, mates): (&[u32], &[Vec<u32>]),
+        rows: &mut [Row],
+    ) {
         let blocks =
             absent.chunks(BLOCK).map(|at| (at.len(), self.block(likeness, at.iter().copied())));
         let blocks: Vec<(usize, L::Block)> = blocks.collect();
         let scratch = || vec![0.0f32; BLOCK * BLOCK];
         let of_block = |scores: &mut Vec<f32>, at: usize, rows: &mut &mut [Row]| {
-            let own = own[at * BLOCK..][..rows.len()].iter().copied();
-            let a = self.block(likeness, own);
+            let all = at * BLOCK..at * BLOCK + rows.len();
+            let a = self.block(likeness, own[all.clone()].iter().copied());
             for (n, absent) in &blocks {
                 likeness.scores(&a, absent, scores);
                 for (row, scores) in rows.iter_mut().zip(scores.chunks(BLOCK)) {
                     scores[..*n].iter().for_each(|&score| row.uncount(score, L::STEP));
                 }
             }
+            let pairs = mates[all]
+                .iter()
+                .zip(0..)
+                .flat_map(|(mates, row)| mates.iter().map(move |&mate| (row, mate)));
+            for pairs in pairs.collect::<Vec<(usize, u32)>>().chunks(BLOCK) {
+                let b = self.block(likeness, pairs.iter().map(|&(_, mate)| mate));
+                likeness.scores(&a, &b, scores);
+                for (at, &(row, _)) in pairs.iter().enumerate() {
+                    rows[row].uncount(scores[row * BLOCK + at], L::STEP);
+                }
+            }
         };
         let mut rows: Vec<&mut [Row]> = rows.chunks_mut(BLOCK).collect();
         parallel::for_each_mut(&mut rows, scratch, of_block);
-    }
-
-    /// Returns the scores of pairs of a row, `own` of which is its place here, with a place here.
-    fn scores<L: Likeness>(&self, likeness: &L, own: &[u32], pairs: &[(u32, u32)]) -> Vec<f32> {
-        let scratch = || vec![0.0f32; BLOCK * BLOCK];
-        let chunks: Vec<&[(u32, u32)]> = pairs.chunks(BLOCK).collect();
-        let of_pairs = |scores: &mut Vec<f32>, at: usize| {
-            let pairs = chunks[at];
-            let a = self.block(likeness, pairs.iter().map(|&(row, _)| own[row as usize]));
-            let b = self.block(likeness, pairs.iter().map(|&(_, at)| at));
-            likeness.scores(&a, &b, scores);
-            (0..pairs.len()).map(|at| scores[at * BLOCK + at]).collect::<Vec<f32>>()
-        };
-        parallel::map_with(chunks.len(), scratch, of_pairs).concat()
     }
 }
 
@@ -390,10 +389,7 @@ impl Best {
     }
 
     fn shrink(&mut self) {
-        if self.n_best == 0 {
-            self.entries.clear();
-            self.floor = f32::INFINITY;
-        } else if self.entries.len() > self.n_best {
+        if self.entries.len() > self.n_best {
             self.entries.select_nth_unstable_by(self.n_best - 1, higher_first);
             self.entries.truncate(self.n_best);
             self.floor = self.entries[self.n_best - 1].0;

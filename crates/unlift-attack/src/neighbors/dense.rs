@@ -27,20 +27,17 @@ pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<
     Error::check_len("dense scores", n_usual, n, " means and deviations")?;
     let mut scores = raw(descriptors);
     let usual = usual.map_or_else(|| within(&scores, n), <[_]>::to_vec);
+    let standardize = |(): &mut (), at: usize, line: &mut &mut [f32]| {
+        let row = at % n;
+        for (column, score) in line.iter_mut().enumerate() {
+            // A blank descriptor has a deviation of 0.
+            let [own, others] = [usual[row], usual[column]]
+                .map(|(mean, deviation)| (f64::from(*score) - mean) / deviation.max(1e-9));
+            *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
+        }
+    };
     let mut lines: Vec<&mut [f32]> = scores.chunks_mut(n).collect();
-    parallel::for_each_mut(
-        &mut lines,
-        || (),
-        |(), at, line| {
-            let row = at % n;
-            for (column, score) in line.iter_mut().enumerate() {
-                // A blank descriptor has a deviation of 0.
-                let [own, others] = [usual[row], usual[column]]
-                    .map(|(mean, deviation)| (f64::from(*score) - mean) / deviation.max(1e-9));
-                *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
-            }
-        },
-    );
+    parallel::for_each_mut(&mut lines, || (), standardize);
     Ok(scores)
 }
 

@@ -74,11 +74,10 @@ impl Rankings {
 }
 
 pub(super) fn are_equal((a, i): (&Descriptors, u32), (b, j): (&Descriptors, u32)) -> bool {
-    let row = |at: u32| at as usize * a.dim()..(at as usize + 1) * a.dim();
+    let (i, j) = (a.range(i as usize), b.range(j as usize));
     match (a.values(), b.values()) {
-        _ if a.dim() != b.dim() => false,
-        (Values::U8(a), Values::U8(b)) => a[row(i)] == b[row(j)],
-        (Values::F32(a), Values::F32(b)) => a[row(i)] == b[row(j)],
+        (Values::U8(a), Values::U8(b)) => a[i] == b[j],
+        (Values::F32(a), Values::F32(b)) => a[i] == b[j],
         _ => false,
     }
 }

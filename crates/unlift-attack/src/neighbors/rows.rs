@@ -18,8 +18,7 @@ fn records_of(slots: &[u32], slots_per_record: usize) -> Vec<u32> {
 /// Returns the rows of `descriptors` sorted by content; equal ones by their numbers.
 pub fn by_content(descriptors: &Descriptors) -> Vec<u32> {
     let mut slots: Vec<u32> = (0..descriptors.len() as u32).collect();
-    let dim = descriptors.dim();
-    let row = |slot: u32| slot as usize * dim..(slot as usize + 1) * dim;
+    let row = |slot: u32| descriptors.range(slot as usize);
     match descriptors.values() {
         Values::U8(v) => {
             slots.sort_unstable_by(|&a, &b| v[row(a)].cmp(&v[row(b)]).then(a.cmp(&b)));

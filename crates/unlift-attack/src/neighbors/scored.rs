@@ -59,16 +59,14 @@ pub fn scored<const D: usize>(
         Some(at) => kept.rankings.remove(at),
         None => rankings(&mut rows, n_best, hypotheses.as_ref(), scores, kept)?,
     };
-    let without_own = |ranked: &[Ranked]| -> Vec<Ranked> {
-        let record = |row: u32| rows.records[row as usize];
-        let of = |row: usize| -> Ranked {
-            let is_other = |&&(_, other): &&(f32, u32)| record(other) != rows.records[row];
+    let record = |row: u32| rows.records[row as usize];
+    let without_own = |ranked: &Vec<Ranked>| {
+        parallel::map(ranked.len(), |row| -> Ranked {
+            let is_other = |entry: &&(f32, u32)| record(entry.1) != rows.records[row];
             ranked[row].iter().filter(is_other).copied().collect()
-        };
-        parallel::map(ranked.len(), of)
+        })
     };
-    let (mut trained, untrained) =
-        (without_own(&rankings.trained), without_own(&rankings.untrained));
+    let [mut trained, untrained] = [&rankings.trained, &rankings.untrained].map(without_own);
     if rows.len() <= MOST_ROWS {
         kept.rankings.push(rankings);
         let too_many = kept.rankings.len().saturating_sub(MAX_RANKINGS);
@@ -344,13 +342,9 @@ mod tests {
     fn alike(part: &Part) -> Result<Vec<f32>, Error> {
         // A few of the values suffice to tell points apart.
         let Values::U8(values) = part.descriptors.values() else { panic!("bytes") };
-        let rows: Vec<&[u8]> = values.chunks_exact(128).map(|row| &row[..9]).collect();
-        let apart = |a: &[u8], b: &[u8]| -> i32 {
-            a.iter().zip(b).map(|(&a, &b)| (i32::from(a) - i32::from(b)).pow(2)).sum()
-        };
-        let score = |(a, b): (&&[u8], &&[u8])| apart(a, b) as f32 / -30.0;
-        let pairs = rows.iter().flat_map(|a| rows.iter().map(move |b| (a, b)));
-        Ok(pairs.map(score).collect())
+        let few = values.chunks_exact(128).flat_map(|row| &row[..9]).copied().collect();
+        let (few, n) = (Descriptors::try_new(Values::U8(few), 9)?, part.descriptors.len());
+        Ok((0..n * n).map(|at| few.squared_distance(at / n, at % n) / -30.0).collect())
     }
 
     /// Scores of one set in which opposite points are near.

@@ -1,10 +1,10 @@
 //! The trait [`Source`], which makes neighborhoods from a released map alone and which you can implement, and the registry of sources.
 
-use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
 use super::{Geometric, KeptPairs, Neighborhoods, Overlap, Similarity};
+use crate::compiled::Both;
 use crate::released::Released;
 use crate::{About, Descriptors, Error, RowOrder};
 
@@ -44,8 +44,7 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
     ///
     /// # Errors
     /// States what kind of descriptors it expects, and what it found.
-    fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        let _ = descriptors;
+    fn takes(&self, _descriptors: &Descriptors) -> Result<(), Error> {
         Ok(())
     }
 
@@ -70,15 +69,13 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
         released: &Released<D>,
         k: usize,
         seed: u64,
-        kept: &mut KeptPairs,
+        _kept: &mut KeptPairs,
     ) -> Result<Neighborhoods, Error> {
-        let _ = kept;
         self.lists(released, k, seed)
     }
 
     /// Returns a note for users about lists for `n_slots` hidden points, if there is one.
-    fn note(&self, n_slots: usize) -> Option<String> {
-        let _ = n_slots;
+    fn note(&self, _n_slots: usize) -> Option<String> {
         None
     }
 }
@@ -123,10 +120,8 @@ pub struct SourceEntry {
 impl SourceEntry {
     /// Returns the source in `D` dimensions, if it is defined there.
     pub fn of_dimension<const D: usize>(&self) -> Option<Arc<dyn Source<D>>> {
-        // A constant cannot select one of two types, so `Any` compares them.
-        let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
-        let build = of.downcast_ref::<Option<fn() -> Arc<dyn Source<D>>>>().copied().flatten();
-        build.map(|build| build())
+        let build = Both(self.in_2d, self.in_3d).of::<Option<fn() -> Arc<dyn Source<D>>>>();
+        build.ok().flatten().map(|build| build())
     }
 }
 

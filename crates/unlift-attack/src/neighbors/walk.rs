@@ -94,15 +94,12 @@ pub fn edges(ranked: &[Ranked], n: usize) -> Vec<Vec<(u32, f32)>> {
             edges[partner as usize].push((row as u32, score));
         }
     }
-    parallel::for_each_mut(
-        &mut edges,
-        || (),
-        |(), _, row| {
-            // An edge that both ends keep is one edge with the same score.
-            row.sort_unstable_by_key(|&(partner, _)| partner);
-            row.dedup_by_key(|&mut (partner, _)| partner);
-        },
-    );
+    // An edge that both ends keep is one edge with the same score.
+    let merge = |(): &mut (), _, row: &mut Vec<(u32, f32)>| {
+        row.sort_unstable_by_key(|&(partner, _)| partner);
+        row.dedup_by_key(|&mut (partner, _)| partner);
+    };
+    parallel::for_each_mut(&mut edges, || (), merge);
     edges
 }
 
@@ -110,20 +107,16 @@ pub fn edges(ranked: &[Ranked], n: usize) -> Vec<Vec<(u32, f32)>> {
 fn graph(ranked: &[Ranked]) -> Vec<Vec<(u32, f64)>> {
     let edges = edges(ranked, EDGES);
     let step = |row: usize| {
-        let wide = edges[row].iter().map(|&(partner, z)| (partner, f64::from(z)));
-        let mut row: Vec<(u32, f64)> = wide.collect();
+        let row = || edges[row].iter().map(|&(partner, z)| (partner, f64::from(z)));
         let weight = |z: f64, usual: f64| libm::exp(SHARPNESS * (z - usual));
-        let total = |usual: f64| row.iter().map(|&(_, z)| weight(z, usual)).sum::<f64>();
+        let total = |usual: f64| row().map(|(_, z)| weight(z, usual)).sum::<f64>();
         // Rows with a deviation of 0 may have scores beyond the range of an exponential.
-        let top = row.iter().map(|&(_, z)| z).fold(f64::NEG_INFINITY, f64::max);
+        let top = row().map(|(_, z)| z).fold(f64::NEG_INFINITY, f64::max);
         let (usual, sum) = match total(USUAL) {
             sum if sum.is_normal() => (USUAL, sum),
             _ => (top, total(top)),
         };
-        for (_, z) in &mut row {
-            *z = weight(*z, usual) / sum;
-        }
-        row
+        row().map(|(partner, z)| (partner, weight(z, usual) / sum)).collect()
     };
     parallel::map(edges.len(), step)
 }

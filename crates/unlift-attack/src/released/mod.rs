@@ -88,10 +88,9 @@ impl<const D: usize> Released<D> {
                 f32s(&mut hasher, rays.centers().as_flattened());
                 hasher.update(rays.center());
                 f32s(&mut hasher, rays.direction().as_flattened());
-                rays.regions()
-                    .into_iter()
-                    .flatten()
-                    .for_each(|region| corners(&mut hasher, region));
+                for region in rays.regions().into_iter().flatten() {
+                    corners(&mut hasher, region);
+                }
             }
             Obfuscation::AxisPlanes(planes) => {
                 hasher.update(planes.axis());

@@ -303,9 +303,8 @@ fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], E
 fn finite_f32<const D: usize>(v: [f64; D], what: &str, row: usize) -> Result<[f32; D], Error> {
     let rounded = v.map(|x| x as f32);
     if rounded.iter().all(|x| x.is_finite()) {
-        Ok(rounded)
-    } else {
-        let what = format!("{what} of record {row}");
-        Err(Error::new(what, "coordinates in the range of f32", format!("{v:?}")))
+        return Ok(rounded);
     }
+    let what = format!("{what} of record {row}");
+    Err(Error::new(what, "coordinates in the range of f32", format!("{v:?}")))
 }

@@ -20,7 +20,7 @@ use crate::neighbors::{Blocks, Neighborhoods, comparable, mutual};
 use crate::parallel;
 use crate::recover::{Confidence, Estimate, RecoverOptions, Recovered, Status, recover_from};
 use crate::released::{Obfuscation, Rays, Released};
-use crate::{About, Error, RowOrder, Unit};
+use crate::{About, Descriptors, Error, RowOrder, Unit};
 
 /// Cosine of the largest angle between the viewing directions of two queries that are compared: 75 degrees.
 const TURNED: f64 = 0.26;
@@ -239,16 +239,14 @@ impl Links {
     /// # Errors
     /// When a query has no descriptors, or two have descriptors of different length.
     pub fn by_descriptors(queries: &[Query], reach: usize) -> Result<Self, Error> {
-        let mut described = Vec::with_capacity(queries.len());
+        let mut described: Vec<&Descriptors> = Vec::with_capacity(queries.len());
         for (at, query) in queries.iter().enumerate() {
             let Some(descriptors) = query.released.descriptors() else {
                 return Err(Error::new(format!("query {at}"), "descriptors", "none"));
             };
             described.push(descriptors);
-        }
-        for (at, rows) in described.iter().enumerate() {
             let (what, rule) = (format!("descriptors of query {at}"), " columns, as in query 0");
-            Error::check_len(&what, rows.dim(), described[0].dim(), rule)?;
+            Error::check_len(&what, descriptors.dim(), described[0].dim(), rule)?;
         }
         let described = comparable(&described);
         let blocks: Vec<Blocks> = parallel::map(described.len(), |at| Blocks::new(&described[at]));
@@ -321,13 +319,9 @@ impl Links {
         let mut votes: Vec<(u32, u32)> = votes.copied().collect();
         votes.sort_unstable();
         for of_query in votes.chunk_by(|a, b| a.0 == b.0) {
-            let mut best: &[(u32, u32)] = &[];
-            for of_slot in of_query.chunk_by(|a, b| a == b) {
-                if of_slot.len() > best.len() {
-                    best = of_slot;
-                }
-            }
-            found.extend(best.first());
+            // Of slots with equally many votes, the first.
+            let best = of_query.chunk_by(|a, b| a == b).rev().max_by_key(|votes| votes.len());
+            found.extend(best.and_then(<[_]>::first));
         }
         found.sort_unstable();
         found

@@ -127,8 +127,7 @@ pub fn triangulate(sights: &[Sight], noise_px: f64) -> Option<Fit> {
         }
         fits.extend(refine(sights, *x, noise_px));
     }
-    let at = (0..fits.len()).min_by(|&a, &b| fits[a].0.total_cmp(&fits[b].0))?;
-    let (least, mut fit) = fits[at];
+    let &(least, mut fit) = fits.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let others =
         fits.iter().filter(|(_, other)| distance(&other.place, &fit.place) > APART * noise_px);
     fit.lead = others.map(|(cost, _)| cost - least).fold(f64::INFINITY, f64::min);
