@@ -6,8 +6,7 @@
 use std::sync::Arc;
 
 use unlift::audit::{Plan, Silent, run};
-use unlift::obfuscate::olc;
-use unlift::obfuscate::{Lifted, LocalPoints, Scheme};
+use unlift::obfuscate::{Lifted, LocalPoints, Scheme, olc};
 use unlift::released::{Lines, Obfuscation};
 use unlift::seed::{Key, Stage};
 use unlift::truth::Original;

@@ -3,7 +3,7 @@
 use unlift::evaluate::Truth;
 use unlift::neighbors::{Neighborhoods, Source};
 use unlift::obfuscate::Scheme;
-use unlift::recover::{RecoverOptions, Recovered, Solver, recover};
+use unlift::recover::{RecoverOptions, Solver, recover};
 use unlift::released::Released;
 
 use crate::{hide, on_threads, piles, room, uniform};
@@ -95,8 +95,6 @@ pub fn source_laws<const D: usize>(source: &dyn Source<D>, released: &Released<D
     let lists = listed(1);
     assert_eq!(lists.n_slots(), released.n_slots(), "{name}: not one list per slot");
     assert!(lists.longest() <= 6, "{name}: a list has {} records, not at most 6", lists.longest());
-    let finite = lists.scores().is_none_or(|scores| scores.iter().all(|score| score.is_finite()));
-    assert!(finite, "{name}: a score is not finite");
     assert_eq!(lists.about().map, Some(released.fingerprint()), "{name}: wrong map");
     assert!(lists == listed(3), "{name}: the number of threads changes lists");
     if let Ok(lists) = source.lists(released, released.n_records() + 1, 0) {
@@ -129,21 +127,13 @@ pub fn solver_laws<const D: usize>(
     assert_eq!(recovered.unit(), released.unit(), "{name}: wrong unit");
     assert_eq!(recovered.origin(), released.origin(), "{name}: wrong origin");
     assert_eq!(recovered.about().map, Some(released.fingerprint()), "{name}: wrong map");
-    assert!(same(&recovered, &solved(3)), "{name}: the number of threads changes positions");
+    // Positions of lost points are NaN, which only their text equals.
+    let [one, three] = [&recovered, &solved(3)].map(|recovered| format!("{recovered:?}"));
+    assert!(one == three, "{name}: the number of threads changes positions");
     let empty = Neighborhoods::empty(released.n_slots());
     if let Ok(recovered) = recover(released, &empty, solver, &RecoverOptions::default()) {
         assert_eq!(recovered.n_slots(), released.n_slots(), "{name}: slots of empty lists");
     }
-}
-
-fn same<const D: usize>(a: &Recovered<D>, b: &Recovered<D>) -> bool {
-    // Positions of lost points are NaN.
-    let bits =
-        |of: &Recovered<D>| of.positions().iter().map(|x| x.map(f32::to_bits)).collect::<Vec<_>>();
-    let columns = |of: &Recovered<D>| {
-        (of.delta(), of.status().to_vec(), of.support().to_vec(), of.evidence().to_vec())
-    };
-    bits(a) == bits(b) && columns(a) == columns(b)
 }
 
 /// Panics if `name` is not one plain word.

@@ -57,15 +57,12 @@ pub fn piles<const D: usize>(
 
 /// Returns image bounds around `points`, in whole units of `step`.
 fn image_around<const D: usize>(points: &[[f64; D]], step: f64) -> Bounds<D> {
-    if points.is_empty() {
+    let Some(Bounds { low, high }) = Bounds::quantiles(points, 0.0) else {
         return Bounds { low: [0.0; D], high: [step; D] };
-    }
-    let column = |c: usize| points.iter().map(move |p| p[c]);
-    let low = |c: usize| column(c).fold(f64::INFINITY, f64::min);
-    let high = |c: usize| column(c).fold(f64::NEG_INFINITY, f64::max);
+    };
     Bounds {
-        low: std::array::from_fn(|c| ((low(c) / step).floor() - 1.0) * step),
-        high: std::array::from_fn(|c| ((high(c) / step).ceil() + 1.0) * step),
+        low: low.map(|x| ((x / step).floor() - 1.0) * step),
+        high: high.map(|x| ((x / step).ceil() + 1.0) * step),
     }
 }
 
