@@ -156,10 +156,8 @@ mod tests {
             assert!(a.iter().zip(&b).all(near), "{read:?} {written:?}");
         }
         let read = read_points(&at("points3D.txt"), false).unwrap();
-        assert_eq!(
-            (read.ids, read.positions),
-            (vec![1, 3], points.into_iter().flatten().collect())
-        );
+        assert_eq!(read.ids, [1, 3]);
+        assert_eq!(read.positions, points.into_iter().flatten().collect::<Vec<_>>());
     }
 
     #[test]

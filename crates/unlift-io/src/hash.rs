@@ -11,17 +11,15 @@ use unlift::descriptors::Values;
 
 /// Returns the SHA-256 of a file's content, as 64 hexadecimal digits.
 pub fn hash_file(path: &Path) -> Result<String, Error> {
-    let failed = |source| Error::read(path, source);
     let (mut file, _) = input::open(path)?;
-    let mut hasher = Sha256::new();
-    let mut piece = vec![0; 1 << 16];
+    let (mut hasher, mut piece) = (Sha256::new(), Vec::new());
     loop {
-        match file.read(&mut piece) {
-            Ok(0) => return Ok(hex(hasher)),
-            Ok(n) => hasher.update(&piece[..n]),
-            Err(source) if source.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(source) => return Err(failed(source)),
+        piece.clear();
+        let read = file.by_ref().take(1 << 16).read_to_end(&mut piece);
+        if read.map_err(|source| Error::read(path, source))? == 0 {
+            return Ok(hex(hasher));
         }
+        hasher.update(&piece);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Reads and writes features in hloc's layout: an HDF5 group per image, an array per kind of feature.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -390,8 +390,8 @@ pub struct FeatureWriter {
     // Dropped before `output`, which removes the file that it has open.
     file: File,
     output: OutputFile,
-    images: BTreeSet<String>,
-    folders: BTreeSet<String>,
+    /// The names of images, and (false) of the folders above them.
+    is_image: BTreeMap<String, bool>,
     /// Bytes since the last commit.
     staged: usize,
 }
@@ -408,13 +408,10 @@ impl FeatureWriter {
             .with_memory_strategy(MemoryStrategy::Bounded)
             .with_sync_policy(SyncPolicy::OnClose);
         let file = File::create_with_options(&output.partial, FileCreateProperties::new(), access);
-        let file = file.and_then(|file| {
-            file.root().set_attr(WRITER, AttrValue::AsciiString("unlift".to_owned()))?;
-            Ok(file)
-        });
         let file = file.map_err(|error| failed(path, error))?;
-        let (images, folders) = (BTreeSet::new(), BTreeSet::new());
-        Ok(Self { file, output, images, folders, staged: 0 })
+        let writer = AttrValue::AsciiString("unlift".to_owned());
+        file.root().set_attr(WRITER, writer).map_err(|error| failed(path, error))?;
+        Ok(Self { file, output, is_image: BTreeMap::new(), staged: 0 })
     }
 
     /// Checks that an image can be written.
@@ -450,10 +447,8 @@ impl FeatureWriter {
             let expected = format!("{n}, one per keypoint");
             return Err(Error::new(&self.output.path, place, expected, len));
         }
-        if self.images.contains(name)
-            || self.folders.contains(name)
-            || folders(name).any(|folder| self.images.contains(folder))
-        {
+        let is_image = |folder: &str| self.is_image.get(folder) == Some(&true);
+        if self.is_image.contains_key(name) || folders(name).any(is_image) {
             let found = "one that exists already, or contains or is inside another image";
             return wrong("a new name", &found);
         }
@@ -472,11 +467,11 @@ impl FeatureWriter {
     fn stage(&mut self, image: &ImageFeatures) -> Result<(), hdf5_pure::Error> {
         let root = self.file.root();
         for folder in folders(&image.name) {
-            if self.folders.insert(folder.to_owned()) {
+            if self.is_image.insert(folder.to_owned(), false).is_none() {
                 root.create_group(folder)?;
             }
         }
-        self.images.insert(image.name.clone());
+        self.is_image.insert(image.name.clone(), true);
         let columns = columns(image);
         self.staged += columns.iter().map(|(.., bytes)| bytes.len()).sum::<usize>();
         root.create_group_with(&image.name, |group| {

@@ -28,19 +28,17 @@ pub(super) fn links(file: &impl Source, address: u64) -> Option<Vec<(String, Tar
     let read = |at: u64, n: u64| file.read_exact_at(at, usize::try_from(n).ok()?).ok();
     let start = read(address, 16)?;
     let is_new = start.starts_with(b"OHDR");
-    let flags = if is_new { start[5] } else { 0 };
-    let first = if is_new {
-        let before =
-            6 + if flags & 0x20 != 0 { 16 } else { 0 } + if flags & 0x10 != 0 { 4 } else { 0 };
+    // The first block, and bytes of the type of a message and of all before its body.
+    let (first, kind, head) = if is_new {
+        let flags = start[5];
+        let times = if flags & 0x20 != 0 { 16 } else { 0 };
+        let before = 6 + times + if flags & 0x10 != 0 { 4 } else { 0 };
         let width = 1 << (flags & 3);
-        (address + before + width, number(&read(address + before, width)?))
+        let first = (address + before + width, number(&read(address + before, width)?));
+        // A flag states that messages have numbers.
+        (first, 1, if flags & 4 != 0 { 6 } else { 4 })
     } else {
-        (address + 16, number(&start[8..12]))
-    };
-    // Bytes of the type of a message, and of all before its body. A flag states that messages have numbers.
-    let (kind, head) = match is_new {
-        true => (1, if flags & 4 != 0 { 6 } else { 4 }),
-        false => (2, 8),
+        ((address + 16, number(&start[8..12])), 2, 8)
     };
     let (mut blocks, mut at, mut links) = (vec![first], 0, Vec::new());
     while let Some(&(start, size)) = blocks.get(at) {

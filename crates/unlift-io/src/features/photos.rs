@@ -14,12 +14,6 @@ const OTHER_ENDINGS: [&str; 24] = [
     "jxl", "nef", "orf", "pbm", "pgm", "ppm", "raf", "rw2", "tga", "tif", "tiff",
 ];
 
-/// Returns true if the file name is that of a photo.
-fn is_photo(path: &Path) -> bool {
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    ending.is_some_and(|ending| ENDINGS.contains(&&*ending))
-}
-
 /// The photos in a folder and its subfolders.
 #[derive(Debug, Default)]
 pub struct Photos {
@@ -35,24 +29,19 @@ impl Photos {
     /// Lists the photos in `root` and its subfolders, each folder once: under its own name, or
     /// under the first link to it. Names that begin with a dot are skipped.
     pub fn list(root: &Path) -> Self {
-        let mut listing = Self::default();
-        listing.visit(root);
-        listing.photos.sort_unstable();
-        listing
-    }
-
-    /// Adds the files in `root` and its subfolders, each folder once: links between folders can
-    /// create endless paths. Links come after all folders, so that photos have the names of their
-    /// own folders, and sorted, so that the result does not depend on the file system.
-    fn visit(&mut self, root: &Path) {
-        let mut visited = HashSet::new();
+        let (mut listing, mut visited) = (Self::default(), HashSet::new());
+        // Links between folders can create endless paths. They come after all folders, so that
+        // photos have the names of their own folders, and sorted, so that the result does not
+        // depend on the file system.
         let mut waiting = BTreeSet::from([(false, String::new(), root.to_owned())]);
         while let Some((_, name, folder)) = waiting.pop_first() {
             let Ok(real) = fs::canonicalize(&folder) else { continue };
             if visited.insert(real) {
-                self.add(&name, &folder, &mut waiting);
+                listing.add(&name, &folder, &mut waiting);
             }
         }
+        listing.photos.sort_unstable();
+        listing
     }
 
     /// Adds the files in `folder`, whose name is `prefix`. Adds to `waiting`, for each subfolder,
@@ -83,9 +72,9 @@ impl Photos {
                 "" => name.to_owned(),
                 _ => format!("{prefix}/{name}"),
             });
-            let (is_folder, is_photo) = (path.is_dir(), is_photo(&path));
             let ending = path.extension().unwrap_or_default().to_string_lossy();
             let ending = ending.to_ascii_lowercase();
+            let (is_folder, is_photo) = (path.is_dir(), ENDINGS.contains(&&*ending));
             if !is_folder && OTHER_ENDINGS.contains(&&*ending) {
                 *self.others.entry(ending).or_default() += 1;
             }

@@ -147,10 +147,6 @@ impl<R: Read> Bytes<R> {
         self.array(what).map(u32::from_le_bytes)
     }
 
-    pub fn i32(&mut self, what: &str) -> Result<i32, Error> {
-        self.array(what).map(i32::from_le_bytes)
-    }
-
     pub fn u64(&mut self, what: &str) -> Result<u64, Error> {
         self.array(what).map(u64::from_le_bytes)
     }

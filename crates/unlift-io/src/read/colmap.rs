@@ -272,7 +272,7 @@ fn binary_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
     for number in 1..=n {
         bytes.record(number);
         let id = bytes.u32("camera id")?;
-        let model_id = bytes.i32("camera model")?;
+        let model_id = bytes.array("camera model").map(i32::from_le_bytes)?;
         let model = usize::try_from(model_id).ok().and_then(|id| CAMERA_MODELS.get(id));
         let Some(model) = model else {
             let expected = format!("a camera model of COLMAP (0 to 17) for camera {id}");

@@ -37,7 +37,10 @@ pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let (head, len) = input::head(path, 8)?;
     match head.first_chunk() {
         Some(MAGIC) => binary(path, input),
-        Some(SQLITE) => of_database(path, input),
+        Some(SQLITE) => {
+            let database = Database::open(path)?;
+            mean(path, input, &tracks(path, input)?, |image| database.descriptors(&image.name))
+        }
         Some(HDF5) => of_features(path, input),
         Some(magic) if magic.starts_with(npy::MAGIC) => {
             // Rows either exclude or include points without finite coordinates.
@@ -101,17 +104,6 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
 /// L2 norm of the descriptors that COLMAP stores as bytes.
 const BYTE_NORM: f64 = 512.0;
 
-/// Row-major descriptors and their dimension.
-type Stored = (Values, usize);
-
-/// Reads descriptors for every point of `input`, a COLMAP model, from the database at `path`.
-///
-/// Source: COLMAP's documentation, "Database Format".
-fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
-    let database = Database::open(path)?;
-    mean(path, input, &tracks(path, input)?, |image| database.descriptors(&image.name))
-}
-
 /// Reads descriptors for every point of `input`, a COLMAP model, from hloc's features at `path`.
 /// Keypoints must have the indices of the model's 2D points.
 fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
@@ -167,7 +159,8 @@ fn tracks(path: &Path, input: &Input) -> Result<(Vec<Image>, Vec<Observation>), 
     Ok((images, observations))
 }
 
-/// Returns the mean over the observations of each point. `stored` reads the descriptors of an image.
+/// Returns the mean over the observations of each point. `stored` reads the descriptors of an image,
+/// row by row, and their dimension.
 ///
 /// # Errors
 /// Also when descriptors of one point are no more alike than those of others.
@@ -175,7 +168,7 @@ fn mean(
     path: &Path,
     input: &Input,
     (images, observations): &(Vec<Image>, Vec<Observation>),
-    stored: impl Fn(&Image) -> Result<Stored, Error>,
+    stored: impl Fn(&Image) -> Result<(Values, usize), Error>,
 ) -> Result<Descriptors, Error> {
     let (mut layout, mut alike, mut has_bits) = (None, Alike::default(), false);
     let bits = |&byte: &u8| (0..8).map(move |bit| f64::from(byte >> bit & 1) * 2.0 - 1.0);

@@ -124,12 +124,14 @@ pub(crate) fn number<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
 }
 
 pub(crate) fn quoted(word: &[u8]) -> String {
-    const LONGEST: usize = 40;
-    let text = String::from_utf8_lossy(word);
-    if text.chars().count() <= LONGEST {
-        format!("\"{text}\"")
-    } else {
-        format!("\"{}...\"", text.chars().take(LONGEST).collect::<String>())
+    format!("\"{}\"", shortened(&String::from_utf8_lossy(word), 40))
+}
+
+/// Returns `text`, or its first `longest` characters and dots.
+pub(crate) fn shortened(text: &str, longest: usize) -> String {
+    match text.char_indices().nth(longest) {
+        Some((at, _)) => format!("{}...", &text[..at]),
+        None => text.to_owned(),
     }
 }
 

@@ -11,7 +11,6 @@ pub(crate) mod lines;
 mod map_input;
 mod models;
 pub(crate) mod npy;
-mod npz;
 mod nvm;
 mod ply;
 mod table;
@@ -81,16 +80,14 @@ const CONVERSIONS: [(&str, &str); 15] = [
 fn not_read(path: &Path) -> Error {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let found = match &*extension {
-        "" => "a file without extension".to_owned(),
-        extension => format!("a .{extension} file"),
+    let (mut found, kind) = match &*extension {
+        "" => ("a file without extension".to_owned(), &name),
+        _ => (format!("a .{extension} file"), &extension),
     };
-    let kind = if extension.is_empty() { &name } else { &extension };
     let is_it = |names: &str| names.split(' ').any(|its| its == name || its == kind);
-    let found = match CONVERSIONS.iter().find(|(names, _)| is_it(names)) {
-        Some((_, how)) => format!("{found} ({})", how.replace("EXT", kind)),
-        None => found,
-    };
+    if let Some((_, how)) = CONVERSIONS.iter().find(|(names, _)| is_it(names)) {
+        found += &format!(" ({})", how.replace("EXT", kind));
+    }
     Error::new(path, "", EXPECTED, found)
 }
 
@@ -135,9 +132,8 @@ fn file(path: &Path) -> Result<Input, Error> {
             None => colmap_points(path)?,
         },
         (_, "npy") => npy::positions(path)?,
-        ("predictions", "npz") => return Err(not_read(path)),
-        (_, "npz") => npz::positions(path)?,
-        ("sfm_data", "json") => return Err(not_read(path)),
+        ("predictions", "npz") | ("sfm_data", "json") => return Err(not_read(path)),
+        (_, "npz") => npy::archived_positions(path)?,
         (_, "json") => json::read(path)?,
         (_, "out") => bundler::read(path)?,
         (_, "nvm") => nvm::read(path)?,
@@ -160,14 +156,12 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 
 fn folder(path: &Path) -> Result<Input, Error> {
     let Some(model) = Model::find(path)? else {
-        return match other_in_folder(path) {
-            Some(other) => file(&other),
-            None => {
-                let is_there = |(inside, _): &&(&str, &str)| path.join(inside).is_dir();
-                let found = FOLDERS.iter().find(is_there).map_or("none", |(_, found)| found);
-                Err(Error::new(path, "", models::EXPECTED, found))
-            }
-        };
+        if let Some(other) = other_in_folder(path) {
+            return file(&other);
+        }
+        let is_there = |(inside, _): &&(&str, &str)| path.join(inside).is_dir();
+        let found = FOLDERS.iter().find(is_there).map_or("none", |(_, found)| found);
+        return Err(Error::new(path, "", models::EXPECTED, found));
     };
     let mut input = colmap_model(&model)?;
     input.beside = models::beside(path, &model.folder);

@@ -1,4 +1,4 @@
-//! Reads positions and descriptors from NumPy arrays.
+//! Reads positions and descriptors from NumPy arrays and archives of them.
 //!
 //! Our own reader: few types are needed, and a header that declares 2^62 rows must be an error.
 
@@ -7,17 +7,19 @@ use std::path::Path;
 
 use unlift::descriptors::Values;
 
+use super::archive::Archive;
 use super::bytes::{Bytes, Field, Scalar};
 use super::lines::{TELLING, axes, number, quoted};
 use crate::error::Error;
 use crate::read::map_input::Input;
+use crate::stage;
 
 pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
 /// The maximum number of columns of points. Wider arrays are descriptors.
 const MOST_COLUMNS: u64 = 16;
 /// Names of arrays, or of fields of three values, that contain all coordinates.
-pub(super) const PLACES: [&str; 7] =
+const PLACES: [&str; 7] =
     ["xyz", "position", "positions", "points", "points3d", "coordinates", "pts"];
 
 /// Reads positions from an `.npy` file, in either byte and memory order.
@@ -28,10 +30,51 @@ pub fn positions(path: &Path) -> Result<Input, Error> {
     of_points(&mut Bytes::open(path)?, "npy")
 }
 
-pub(super) fn of_points<R: Read>(
-    bytes: &mut Bytes<R>,
-    format: &'static str,
-) -> Result<Input, Error> {
+/// Reads positions from the array of points in a NumPy archive. Several or none are an error.
+pub fn archived_positions(path: &Path) -> Result<Input, Error> {
+    let mut archive = Archive::open(path)?;
+    let all = archive.arrays();
+    if all.iter().any(|(_, name)| name.rsplit('/').next() == Some("unlift")) {
+        let kind = stage::declared_kind(path).map(|kind| kind.to_string());
+        let found = kind.unwrap_or_else(|| "a stage file of unlift".to_owned());
+        return Err(Error::new(path, "", "points of a map", found));
+    }
+    let (mut fit, mut has_points) = (Vec::new(), false);
+    for (at, name) in &all {
+        let header = archive.array(*at, name).and_then(|mut bytes| Header::read(&mut bytes));
+        if let Some((_, layout)) = header.ok().and_then(|header| header.points()) {
+            fit.push((*at, &**name));
+            has_points |= !matches!(layout, Layout::Matrix(4..));
+        }
+    }
+    let has = |start: &str| all.iter().any(|(_, name)| name.starts_with(start));
+    // Some programs store position, size and angle of keypoints in one array, beside descriptors.
+    let beside_descriptors = has("descriptors") && !has_points;
+    if has("keypoints") || has("OPENSFM_FEATURES") || beside_descriptors {
+        return Err(Error::new(path, "", "points of a map", "features of an image"));
+    }
+    let is_known = |name: &str| PLACES.iter().any(|known| name.eq_ignore_ascii_case(known));
+    if fit.iter().filter(|(_, name)| is_known(name)).count() == 1 {
+        fit.retain(|(_, name)| is_known(name));
+    }
+    let [(at, name)] = fit[..] else {
+        if fit.is_empty() {
+            fit = all.iter().map(|(at, name)| (*at, &**name)).collect();
+        }
+        let names: Vec<String> =
+            fit.iter().take(5).map(|(_, name)| quoted(name.as_bytes())).collect();
+        let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let expected = "one array of points, (n, 3), or one that is called points or xyz";
+        return Err(Error::new(path, "", expected, found));
+    };
+    let mut input = of_points(&mut archive.array(at, name)?, "npz")?;
+    if all.len() > 1 {
+        input.notes.push(format!("read, the array {} of {}", quoted(name.as_bytes()), all.len()));
+    }
+    Ok(input)
+}
+
+fn of_points<R: Read>(bytes: &mut Bytes<R>, format: &'static str) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
     let mut input = Input { format, ..Input::default() };
     let Some((rows, layout)) = header.points() else {
@@ -53,7 +96,7 @@ pub(super) fn of_points<R: Read>(
             }
             return Ok(input);
         }
-        Layout::Matrix { columns } => columns as usize,
+        Layout::Matrix(columns) => columns as usize,
     };
     let Some(numbers) = header.numbers(bytes)? else { return Ok(input) };
     let any = |bytes: &Bytes<R>, _, x| bytes.error("a number", x);
@@ -70,15 +113,11 @@ pub(super) fn of_points<R: Read>(
     Ok(input)
 }
 
-pub(super) enum Layout {
-    Matrix {
-        columns: u64,
-    },
+enum Layout {
+    /// Rows of this number of columns.
+    Matrix(u64),
     /// Records of `size` bytes, with the field of each coordinate.
-    Rows {
-        fields: [Field; 3],
-        size: u64,
-    },
+    Rows { fields: [Field; 3], size: u64 },
 }
 
 /// Parses a type: how a value is stored, and true if it is big-endian.
@@ -253,11 +292,11 @@ impl Header {
     }
 
     /// Returns the number of points and the places of their coordinates, if the array can be points.
-    pub(super) fn points(&self) -> Option<(u64, Layout)> {
+    fn points(&self) -> Option<(u64, Layout)> {
         if !self.type_text().starts_with('[') {
             let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;
             let is_usual = (3..=MOST_COLUMNS).contains(&columns);
-            return is_usual.then_some((rows, Layout::Matrix { columns }));
+            return is_usual.then_some((rows, Layout::Matrix(columns)));
         }
         let rows = self.value("shape")?.strip_prefix('(')?.split([',', ')']).next()?;
         let (mut names, mut fields, mut size) = (Vec::new(), Vec::new(), 0u64);

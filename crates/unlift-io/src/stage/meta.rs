@@ -8,6 +8,7 @@ use unlift::{About, Fingerprint, RowOrder, Unit};
 
 use super::kind::Kind;
 use crate::Error;
+use crate::read::lines::shortened;
 
 pub(super) const KEY: &str = "unlift";
 
@@ -125,11 +126,7 @@ impl<'a> Meta<'a> {
 }
 
 fn short(value: &Value) -> String {
-    let text = value.to_string();
-    match text.char_indices().nth(60) {
-        Some((at, _)) => format!("{}...", &text[..at]),
-        None => text,
-    }
+    shortened(&value.to_string(), 60)
 }
 
 /// Formats `meta` with sorted keys, so that equal values make equal bytes with any map type of

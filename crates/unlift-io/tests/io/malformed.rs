@@ -8,7 +8,7 @@ use unlift_io::features::FeatureSource;
 use unlift_io::{read, stage};
 
 use super::stages::maps;
-use super::{copy_folder, data, fixture, npy as array, refused, shown, write};
+use super::{copy_folder, data, fixture, npy as array, shown, write};
 
 pub fn patched(mut file: Vec<u8>, at: usize, bytes: &[u8]) -> Vec<u8> {
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -66,12 +66,6 @@ fn what_is_no_regular_file_is_refused() {
     if std::process::Command::new("mkfifo").arg(pipe).status().is_ok_and(|made| made.success()) {
         check("pipe.ply");
     }
-}
-
-#[test]
-fn a_line_without_end_is_refused() {
-    let line = "a.csv:1: expected a line of at most 16 MiB, found a longer one";
-    assert_eq!(refused("a.csv", vec![b'1'; (16 << 20) + 1]), line);
 }
 
 /// The model without rigs and frames.
@@ -171,6 +165,7 @@ fn tables_and_other_names() -> Vec<Row> {
         csv("decimal comma", "1,5;2;3\n", ":1: expected a number for x, found \"1,5\""),
         csv("columns without y", "x,north,z\n1,2,3\n", ":1: expected numbers, or columns named x, y and z, found \"x,north,z\""),
         csv("row shorter than its header", "id,x,y,z\n1,2,3\n", ":2: expected 4 columns up to z, found 3"),
+        alone("a line without end", "a.csv", vec![b'1'; (16 << 20) + 1], ":1: expected a line of at most 16 MiB, found a longer one"),
         alone("control characters", "a.xyz", "1 2 \u{1b}[31m\n", ":1: expected a number for z, found \"\\u{1b}[31m\""),
         ("empty folder", vec![], "", ": expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none".to_owned()),
         alone("a dropped format", "a.laz", "LASF", ": expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz or .splat file, found a .laz file (convert it: CloudCompare -O in.laz -SAVE_CLOUDS, or pdal translate in.laz out.ply)"),
@@ -195,6 +190,8 @@ fn arrays() -> Vec<Row> {
         npy("header cut", good[..60].to_vec(), ": header (byte 10): expected a header of 118 bytes, found 50 bytes"),
         npy("complex numbers", of("'<c8'", "False", "(2, 3)"), ": header (byte 10): expected numbers, or fields of numbers called x, y and z, found \"<c8\""),
         npy("two columns", of("'<f8'", "False", "(3, 2)"), ": header (byte 10): expected an array of shape (n, 3), found \"(3, 2)\""),
+        npy("row numbers", array("'|u1'", "(10, 4)", &(0..10).flat_map(|row| [row, 5, 6, 7]).collect::<Vec<u8>>()), ": header (byte 128): expected x, y and z in the first columns, found the row number"),
+        npy("a field of another name", array("[('a', '<f4')]", "(1,)", &[0; 4]), ": header (byte 10): expected numbers, or fields of numbers called x, y and z, found \"[('a', '<f4')]\""),
         npy("no order", of("'<f8'", "None", "(2, 3)"), ": header (byte 10): expected fortran_order True or False, found \"None\""),
         npy("2^62 rows", of("'<f8'", "False", "(4611686018427387904, 3)"), ": header (byte 128): expected 4611686018427387904 rows of 24 bytes, found 48 bytes"),
         npy("nothing in the header", [&b"\x93NUMPY\x01\0\x02\0{}"[..], &[0; 48]].concat(), ": header (byte 10): expected numbers, or fields of numbers called x, y and z, found \"\""),
