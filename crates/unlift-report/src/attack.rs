@@ -64,20 +64,16 @@ pub(crate) enum Basis {
 
 impl Basis {
     pub(crate) const ALL: [Self; 3] = [Self::Released, Self::Given, Self::Oracle];
-
-    pub(crate) fn of(neighbors: &str, solver: &str) -> Self {
-        match neighbors {
-            _ if !reads_lists(solver) => Self::Released,
-            "oracle" => Self::Oracle,
-            name if queries(name).is_some_and(|(by, _)| by == TRACKS) => Self::Oracle,
-            "file" => Self::Given,
-            _ => Self::Released,
-        }
-    }
 }
 
 pub(crate) fn basis(row: &Row) -> Basis {
-    Basis::of(&row.neighbors, &row.solver)
+    match row.neighbors.as_str() {
+        _ if !reads_lists(&row.solver) => Basis::Released,
+        "oracle" => Basis::Oracle,
+        name if queries(name).is_some_and(|(by, _)| by == TRACKS) => Basis::Oracle,
+        "file" => Basis::Given,
+        _ => Basis::Released,
+    }
 }
 
 /// Sources of a sequence, before `@` and the number of queries: links by descriptors, these with lists of neighbors within each query,

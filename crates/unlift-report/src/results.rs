@@ -1,6 +1,6 @@
 //! The rows of an audit, and the choices among them that all sections share.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use unlift::Unit;
 
@@ -67,11 +67,6 @@ impl<'a> Results<'a> {
         let options = &self.document.options;
         options.get("released")?;
         options.get("schemes")?.get(0)?.as_str()
-    }
-
-    /// Returns whether the audit is of several releases of the same points.
-    pub(crate) fn is_of_releases(&self) -> bool {
-        self.is_sequence() || self.is_again()
     }
 
     pub(crate) fn is_sequence(&self) -> bool {
@@ -155,14 +150,10 @@ impl<'a> Results<'a> {
 
     /// Returns the strongest row of every source of `scheme`: most recovered first, the oracle last.
     pub(crate) fn by_source(&self, scheme: &str) -> Vec<&'a Row> {
-        let mut sources: BTreeMap<&str, &Row> = BTreeMap::new();
-        for row in self.of_scheme(scheme).filter(|row| attack::basis(row) != Basis::Oracle) {
-            let best = sources.entry(&row.neighbors).or_insert(row);
-            if self.share(row) > self.share(best) {
-                *best = row;
-            }
-        }
-        let mut rows: Vec<&Row> = sources.into_values().collect();
+        let own = self.of_scheme(scheme).filter(|row| attack::basis(row) != Basis::Oracle);
+        let sources: BTreeSet<&str> = own.clone().map(|row| row.neighbors.as_str()).collect();
+        let strongest = |by: &str| self.largest(own.clone().filter(|row| row.neighbors == by));
+        let mut rows: Vec<&Row> = sources.into_iter().filter_map(strongest).collect();
         rows.sort_by(|a, b| self.share(b).total_cmp(&self.share(a)));
         rows.extend(self.strongest(scheme, Basis::Oracle));
         rows

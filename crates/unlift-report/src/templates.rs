@@ -55,20 +55,17 @@ fn coded(text: &str) -> Value {
 
 /// Escapes text for XML content and quoted attributes. Characters that XML 1.0 does not allow become U+FFFD.
 fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            // Unescaped, they would become spaces in attributes.
-            '\t' | '\n' | '\r' => out.push_str(&format!("&#{};", u32::from(c))),
-            '\0'..='\x1f' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
-            _ => out.push(c),
-        }
-    }
-    out
+    let escape = |c: char| match c {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '>' => "&gt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        // Unescaped, they would become spaces in attributes.
+        '\t' | '\n' | '\r' => format!("&#{};", u32::from(c)),
+        '\0'..='\x1f' | '\u{fffe}' | '\u{ffff}' => '\u{fffd}'.to_string(),
+        _ => c.to_string(),
+    };
+    text.chars().map(escape).collect()
 }
 
 #[cfg(test)]

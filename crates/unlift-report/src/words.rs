@@ -204,19 +204,18 @@ pub fn align(rows: &[Vec<String>], left: &[usize]) -> String {
         cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut text = String::new();
-    for row in rows {
-        let mut line = String::new();
-        for (column, (cell, width)) in row.iter().zip(&widths).enumerate() {
-            line.push_str(&match left.contains(&column) {
-                true => format!("{cell:<width$}  "),
-                false => format!("{cell:>width$}  "),
-            });
+    let aligned = |(column, (cell, width)): (usize, (&String, &usize))| {
+        if left.contains(&column) {
+            format!("{cell:<width$}  ")
+        } else {
+            format!("{cell:>width$}  ")
         }
-        text.push_str(line.trim_end());
-        text.push('\n');
-    }
-    text
+    };
+    let line = |row: &Vec<String>| {
+        let line: String = row.iter().zip(&widths).enumerate().map(aligned).collect();
+        line.trim_end().to_owned() + "\n"
+    };
+    rows.iter().map(line).collect()
 }
 
 #[cfg(test)]

@@ -184,23 +184,20 @@ fn on_one_line(text: &str) -> String {
 }
 
 fn in_latex(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in on_one_line(text).chars() {
-        match c {
-            '\\' => out.push_str("\\textbackslash{}"),
-            '~' => out.push_str("\\textasciitilde{}"),
-            '^' => out.push_str("\\textasciicircum{}"),
-            '<' => out.push_str("\\textless{}"),
-            '>' => out.push_str("\\textgreater{}"),
-            '|' => out.push_str("\\textbar{}"),
-            '&' | '%' | '$' | '#' | '_' | '{' | '}' => out.extend(['\\', c]),
-            '±' => out.push_str("$\\pm$"),
-            '×' => out.push_str("$\\times$"),
-            '–' => out.push_str("--"),
-            _ => out.push(c),
-        }
-    }
-    out
+    let escape = |c: char| match c {
+        '\\' => "\\textbackslash{}".to_owned(),
+        '~' => "\\textasciitilde{}".to_owned(),
+        '^' => "\\textasciicircum{}".to_owned(),
+        '<' => "\\textless{}".to_owned(),
+        '>' => "\\textgreater{}".to_owned(),
+        '|' => "\\textbar{}".to_owned(),
+        '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
+        '±' => "$\\pm$".to_owned(),
+        '×' => "$\\times$".to_owned(),
+        '–' => "--".to_owned(),
+        _ => c.to_string(),
+    };
+    on_one_line(text).chars().map(escape).collect()
 }
 
 #[cfg(test)]

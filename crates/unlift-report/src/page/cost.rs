@@ -183,24 +183,19 @@ fn sentence(results: &Results<'_>, points: &[Point<'_>], missing: &[String]) -> 
     let names = within.map(|point| point.of.scheme.clone());
     let (names, open): (Vec<String>, Vec<String>) =
         names.partition(|scheme| is_decided(results, Some(scheme)));
-    let open = match open.is_empty() {
-        true => String::new(),
-        false => format!("Nothing is decided about {}.", words::list(&open)),
-    };
+    let open =
+        (!open.is_empty()).then(|| format!("Nothing is decided about {}.", words::list(&open)));
     let limits = format!("below {LEAK} % at a localization error within twice the unprotected one");
-    if names.is_empty() && !open.is_empty() {
-        return open;
-    }
     if names.is_empty() {
         let known = if missing.is_empty() { "tried here" } else { "with both figures" };
-        return format!("No scheme {known} keeps an attacker {limits}.");
+        return open.unwrap_or_else(|| format!("No scheme {known} keeps an attacker {limits}."));
     }
     let keep = if names.len() == 1 { "keeps" } else { "keep" };
     let names = words::list(&names);
-    let text = format!(
-        "{names} {keep} the attacks tried here {limits}. A better attack may recover more. {open}"
+    let kept = format!(
+        "{names} {keep} the attacks tried here {limits}. A better attack may recover more."
     );
-    text.trim_end().to_owned()
+    [Some(kept), open].into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
 /// Returns the table of localization errors beside the leak; `None` without any.
@@ -269,7 +264,7 @@ pub(crate) fn text(results: &Results<'_>) -> String {
     if localization.is_empty() {
         return String::new();
     }
-    let percent = |value: Option<f64>| words::percent_or_dash(value);
+    let percent = words::percent_or_dash;
     let leaks = if basis(results) == Basis::Oracle { "leak by oracle" } else { "leak today" };
     let columns = vec![
         label("scheme", |of: &Localization| of.scheme.clone()),

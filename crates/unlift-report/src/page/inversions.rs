@@ -125,19 +125,37 @@ impl Sheet {
     }
 }
 
-/// Returns the view of [`Results::strongest`] for `scheme` and this basis.
-fn strongest<'a>(
-    results: &Results<'_>,
-    inversion: &'a Inversion,
-    scheme: &str,
-    basis: Basis,
-) -> Option<&'a View> {
-    let is_of = |view: &&View| view.row.scheme == scheme && attack::basis(&view.row) == basis;
-    let views = inversion.views.iter().filter(is_of);
-    let row = results.strongest(scheme, basis);
-    let painted = views.clone().find(|view| row.is_some_and(|row| attack::is_same(&view.row, row)));
-    // If the strongest attack was not painted, the best picture stands in.
-    painted.or_else(|| views.max_by(|a, b| a.recovered.ssim.total_cmp(&b.recovered.ssim)))
+impl Inversion {
+    /// Returns the view of [`Results::strongest`] for `scheme` and this basis.
+    fn strongest(&self, results: &Results<'_>, scheme: &str, basis: Basis) -> Option<&View> {
+        let is_of = |view: &&View| view.row.scheme == scheme && attack::basis(&view.row) == basis;
+        let views = self.views.iter().filter(is_of);
+        let row = results.strongest(scheme, basis);
+        let is_row = |view: &&View| row.is_some_and(|row| attack::is_same(&view.row, row));
+        // If the strongest attack was not painted, the best picture stands in.
+        let best = || views.clone().max_by(|a, b| a.recovered.ssim.total_cmp(&b.recovered.ssim));
+        views.clone().find(is_row).or_else(best)
+    }
+
+    /// Returns the view with the best level of its picture; of equal ones, that of the stronger attack.
+    fn best(&self, results: &Results<'_>, basis: Basis, without: &[&str]) -> Option<&View> {
+        let views = self.views.iter().filter(|view| {
+            let scheme = view.row.scheme.as_str();
+            let strongest = self.strongest(results, scheme, basis);
+            !without.contains(&scheme) && strongest.is_some_and(|of| std::ptr::eq(of, *view))
+        });
+        let rank = |view: &View| {
+            let share = view.row(results).map_or(0.0, |row| results.share(row));
+            (rebuilt(self.kept(view)).0, share)
+        };
+        views.reduce(|a, b| if rank(b) > rank(a) { b } else { a })
+    }
+
+    /// Returns the ratio of the picture's SSIM to that without protection.
+    fn kept(&self, view: &View) -> f64 {
+        let baseline = self.baseline.ssim;
+        if baseline > 0.0 { view.recovered.ssim / baseline } else { 0.0 }
+    }
 }
 
 fn sheet(results: &Results<'_>, inversion: &Inversion) -> Sheet {
@@ -145,7 +163,7 @@ fn sheet(results: &Results<'_>, inversion: &Inversion) -> Sheet {
     let by_queries = results.is_sequence();
     let rows = schemes.into_iter().map(|scheme| {
         let views = inversion.views.iter().filter(|view| view.row.scheme == scheme);
-        let strongest = |basis| strongest(results, inversion, scheme, basis);
+        let strongest = |basis| inversion.strongest(results, scheme, basis);
         let main: Vec<&View> = match by_queries {
             true => views.clone().collect(),
             false => Basis::ALL.into_iter().filter_map(strongest).collect(),
@@ -189,8 +207,8 @@ pub(crate) fn count_rebuilt(
     scheme: &str,
 ) -> Option<String> {
     let level = |inversion: &Inversion| {
-        let view = strongest(results, inversion, scheme, Basis::Released)?;
-        Some(rebuilt(kept(inversion, view)).0)
+        let view = inversion.strongest(results, scheme, Basis::Released)?;
+        Some(rebuilt(inversion.kept(view)).0)
     };
     let levels: Vec<Level> = inversions.iter().filter_map(level).collect();
     let count = |level| levels.iter().filter(|&&of| of == level).count();
@@ -207,42 +225,17 @@ pub(crate) fn exhibits(results: &Results<'_>, inversions: &[Inversion]) -> Vec<V
     let mut shown: Vec<(&Inversion, &View)> = Vec::new();
     for inversion in inversions.iter().take(2) {
         let schemes: Vec<&str> = shown.iter().map(|(_, of)| of.row.scheme.as_str()).collect();
-        let best = best(results, inversion, Basis::Released, &schemes);
+        let best = inversion.best(results, Basis::Released, &schemes);
         shown.extend(best.map(|view| (inversion, view)));
     }
     for basis in [Basis::Given, Basis::Oracle] {
-        shown.extend(best(results, first, basis, &[]).map(|view| (first, view)));
+        shown.extend(first.best(results, basis, &[]).map(|view| (first, view)));
     }
     shown.into_iter().filter_map(|(of, view)| exhibit(results, of, view)).take(3).collect()
 }
 
-/// Returns the view with the best level of its picture; of equal ones, that of the stronger attack.
-fn best<'a>(
-    results: &Results<'_>,
-    inversion: &'a Inversion,
-    basis: Basis,
-    without: &[&str],
-) -> Option<&'a View> {
-    let views = inversion.views.iter().filter(|view| {
-        let scheme = view.row.scheme.as_str();
-        let strongest = strongest(results, inversion, scheme, basis);
-        !without.contains(&scheme) && strongest.is_some_and(|of| std::ptr::eq(of, *view))
-    });
-    let rank = |view: &View| {
-        let share = view.row(results).map_or(0.0, |row| results.share(row));
-        (rebuilt(kept(inversion, view)).0, share)
-    };
-    views.reduce(|a, b| if rank(b) > rank(a) { b } else { a })
-}
-
-/// Returns the ratio of the picture's SSIM to that without protection.
-fn kept(inversion: &Inversion, view: &View) -> f64 {
-    let baseline = inversion.baseline.ssim;
-    if baseline > 0.0 { view.recovered.ssim / baseline } else { 0.0 }
-}
-
 fn exhibit(results: &Results<'_>, inversion: &Inversion, view: &View) -> Option<Value> {
-    let (level, verdict) = rebuilt(kept(inversion, view));
+    let (level, verdict) = rebuilt(inversion.kept(view));
     let (row, scheme) = (view.row(results)?, &view.row.scheme);
     let from = match attack::basis(&view.row) {
         Basis::Released => "From the released data alone,".to_owned(),

@@ -108,11 +108,12 @@ fn encode_picture(picture: &Picture, budget: usize, within: f64, blocks: &mut Bl
     };
     let keypoints = push(&|i| vec![Some(picture.keypoints[i])]);
     let released = picture.released.iter().map(|view| {
-        let (kind, block) = match &view.marks {
-            Marks::Lines(all) => ("lines", push(&|i| ends(all, i))),
-            Marks::Rays(all) => ("rays", push(&|i| ends(all, i))),
-            Marks::Points(all) => ("points", push(&|i| vec![at(all, i)])),
+        let kind = match view.marks {
+            Marks::Lines(_) => "lines",
+            Marks::Rays(_) => "rays",
+            Marks::Points(_) => "points",
         };
+        let block = push(&|i| view.marks.places(i));
         json!({ "scheme": view.scheme, "kind": kind, "block": block })
     });
     let released: Vec<Value> = released.collect();
@@ -161,9 +162,16 @@ fn at<T: Copy>(all: &[Option<T>], i: usize) -> Option<T> {
     all.get(i).copied().flatten()
 }
 
-fn ends(segments: &[Option<[[f32; 2]; 2]>], i: usize) -> Vec<Option<[f32; 2]>> {
-    let segment = at(segments, i);
-    [0, 1].map(|end| segment.map(|segment| segment[end])).to_vec()
+impl Marks {
+    /// Returns the ends of the record of keypoint `i`, or its point.
+    fn places(&self, i: usize) -> Vec<Option<[f32; 2]>> {
+        match self {
+            Self::Lines(all) | Self::Rays(all) => {
+                [0, 1].map(|end| at(all, i).map(|ends| ends[end])).to_vec()
+            }
+            Self::Points(all) => vec![at(all, i)],
+        }
+    }
 }
 
 /// Encodes a position as a little-endian u16 pair, 0..=65534 across the image; points outside move to the border.
@@ -186,19 +194,15 @@ fn key(row: &Row) -> String {
 /// Returns the share of the released keypoints, drawn or not, and a sentence: "81.3 % within 10 px (blue), the others orange; 3 lost".
 fn recovered(picture: &Picture, view: &View, within: f64) -> (f64, String) {
     let released = picture.released.iter().find(|of| of.scheme == view.row.scheme);
-    let is_released = |i: usize| match released.map(|of| &of.marks) {
-        Some(Marks::Lines(all) | Marks::Rays(all)) => all.get(i).is_some_and(Option::is_some),
-        Some(Marks::Points(all)) => all.get(i).is_some_and(Option::is_some),
-        None => true,
+    let is_released = |i: usize| released.is_none_or(|of| of.marks.places(i)[0].is_some());
+    let keypoints = picture.keypoints.iter().enumerate().filter(|(i, _)| is_released(*i));
+    let error = |(i, &truth): (usize, &[f32; 2])| {
+        at(&view.recovered, i).map(|place| distance(place, truth))
     };
-    let (mut n, mut hits, mut lost) = (0u64, 0u64, 0u64);
-    for (i, truth) in picture.keypoints.iter().enumerate().filter(|(i, _)| is_released(*i)) {
-        let place = view.recovered.get(i).copied().flatten();
-        n += 1;
-        lost += u64::from(place.is_none());
-        hits += u64::from(place.is_some_and(|place| distance(place, *truth) <= within));
-    }
-    let share = 100.0 * hits as f64 / n.max(1) as f64;
+    let errors: Vec<Option<f64>> = keypoints.map(error).collect();
+    let hits = errors.iter().flatten().filter(|error| **error <= within).count();
+    let lost = errors.iter().filter(|error| error.is_none()).count();
+    let share = 100.0 * hits as f64 / errors.len().max(1) as f64;
     let lost = if lost > 0 { format!("; {} lost", words::thousands(lost)) } else { String::new() };
     let (percent, within) = (words::percent(share), words::significant(within, 3));
     (share, format!("{percent} % within {within} px (blue), the others orange{lost}"))
@@ -207,14 +211,11 @@ fn recovered(picture: &Picture, view: &View, within: f64) -> (f64, String) {
 /// Returns a sentence: "the first five neighbors of each keypoint; 45.1 % of the edges are shorter than
 /// 48 px (green), the others red".
 fn edges(picture: &Picture, graph: &Graph, short_px: f32) -> String {
-    let (mut n, mut short) = (0u64, 0u64);
-    for (from, neighbors) in picture.keypoints.iter().zip(&graph.neighbors) {
-        for to in neighbors.iter().take(GRAPH_NEIGHBORS) {
-            n += 1;
-            short += u64::from(distance(*from, *to) < f64::from(short_px));
-        }
-    }
-    let share = words::percent(100.0 * short as f64 / n.max(1) as f64);
+    let edges = picture.keypoints.iter().zip(&graph.neighbors).flat_map(|(from, neighbors)| {
+        neighbors.iter().take(GRAPH_NEIGHBORS).map(|to| distance(*from, *to))
+    });
+    let short = edges.clone().filter(|length| *length < f64::from(short_px)).count();
+    let share = words::percent(100.0 * short as f64 / edges.count().max(1) as f64);
     let reach = words::significant(f64::from(short_px), 3);
     format!(
         "the first five neighbors of each keypoint; {share} % of the edges are shorter than {reach} px (green), the others red"

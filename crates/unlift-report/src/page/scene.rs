@@ -146,17 +146,14 @@ pub(crate) fn encode(
 
 /// Returns the data of one scheme's records, whose positions become a block.
 fn obfuscation(bounds: &SceneBox, of: &ObfuscationView, blocks: &mut Blocks) -> Value {
-    let (kind, name, n, max) = match &of.shapes {
-        Shapes::Segments(all) => ("segments", "lines", all.len(), MAX_SHAPES),
-        Shapes::Patches(all) => ("patches", "planes", all.len(), MAX_SHAPES),
-        Shapes::Points(all) => ("points", "points", all.len(), MAX_SHAPE_POINTS),
+    // The corners of all shapes, and how many each has.
+    let (kind, name, corners, each, max) = match &of.shapes {
+        Shapes::Segments(all) => ("segments", "lines", all.as_flattened(), 2, MAX_SHAPES),
+        Shapes::Patches(all) => ("patches", "planes", all.as_flattened(), 4, MAX_SHAPES),
+        Shapes::Points(all) => ("points", "points", &all[..], 1, MAX_SHAPE_POINTS),
     };
-    let chosen = subsample(n, max, 0);
-    let corners = chosen.iter().flat_map(|&i| match &of.shapes {
-        Shapes::Segments(all) => &all[i][..],
-        Shapes::Patches(all) => &all[i],
-        Shapes::Points(all) => std::slice::from_ref(&all[i]),
-    });
+    let chosen = subsample(corners.len() / each, max, 0);
+    let corners = chosen.iter().flat_map(|&i| &corners[i * each..(i + 1) * each]);
     let block = blocks.push(positions(bounds, corners.copied()));
     let [some, all] = [chosen.len() as u64, of.n_records].map(words::thousands);
     // "1,500 of 3,895 lines drawn".
@@ -267,28 +264,20 @@ impl SceneBox {
     ///
     /// Ignores non-finite coordinates; without points it starts from the unit cube about the origin.
     pub fn robust(points: &[[f32; 3]]) -> Self {
-        let mut low = [-0.5; 3];
-        let mut high = [0.5; 3];
-        let mut middle = [0.0; 3];
-        for axis in 0..3 {
+        let sides = [0, 1, 2].map(|axis| {
             let mut values: Vec<f32> =
                 points.iter().map(|p| p[axis]).filter(|x| x.is_finite()).collect();
-            if values.is_empty() {
-                continue;
-            }
             values.sort_unstable_by(f32::total_cmp);
-            let last = values.len() - 1;
-            low[axis] = values[last / 100];
-            high[axis] = values[last - last / 100];
-            middle[axis] = values[last / 2];
-        }
-        let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
+            let Some(last) = values.len().checked_sub(1) else { return [-0.5, 0.0, 0.5] };
+            [last / 100, last / 2, last - last / 100].map(|at| values[at])
+        });
+        let longest = sides.iter().map(|[low, _, high]| high - low).fold(0.0, f32::max);
         let margin = if longest > 0.0 { 0.1 * longest } else { 0.5 };
-        for axis in 0..3 {
-            low[axis] -= margin;
-            high[axis] += margin;
+        Self {
+            low: sides.map(|[low, ..]| low - margin),
+            high: sides.map(|[.., high]| high + margin),
+            middle: sides.map(|[_, middle, _]| middle),
         }
-        Self { low, high, middle }
     }
 
     /// Returns the rectangle of the plane `coordinate[axis] == offset` in the box; `None` if it is outside.

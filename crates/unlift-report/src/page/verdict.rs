@@ -48,21 +48,16 @@ pub(crate) fn cards(results: &Results<'_>) -> Vec<Card> {
 /// Returns the verdict on a scheme; `None` if it has no row, or if nothing tried tells anything.
 pub(crate) fn card(results: &Results<'_>, scheme: &str) -> Option<Card> {
     let first = results.of_scheme(scheme).next()?;
-    let of_basis = |basis| {
-        let row = results.strongest(scheme, basis)?;
-        Some(finding(results, basis, row, Some(results.share(row))))
-    };
-    let mut findings: Vec<Finding> = Basis::ALL.into_iter().filter_map(of_basis).collect();
-    let is_today = |findings: &[Finding]| findings.iter().any(|of| of.basis == Basis::Released);
-    // Baselines need only the released data, so they are attacks of today.
     let alone = results.records_alone(scheme, results.headline);
-    let baseline = finding(results, Basis::Released, first, None);
-    if (alone.is_some() || baseline.level > Level::Gray) && !is_today(&findings) {
-        findings.insert(0, baseline);
-    }
-    if findings.is_empty() {
-        return None;
-    }
+    let of_basis = |basis| match results.strongest(scheme, basis) {
+        Some(row) => Some(finding(results, basis, row, Some(results.share(row)))),
+        // Baselines need only the released data, so they are attacks of today.
+        None if basis == Basis::Released => Some(finding(results, basis, first, None))
+            .filter(|baseline| alone.is_some() || baseline.level > Level::Gray),
+        None => None,
+    };
+    let findings: Vec<Finding> = Basis::ALL.into_iter().filter_map(of_basis).collect();
+    let untried_today = findings.first()?.basis != Basis::Released;
     let refused = results.document.not_audited.iter().filter(|refused| refused.scheme == scheme);
     let refused = refused.filter_map(|refused| {
         let source = attack::plain_source(refused.neighbors.as_deref()?, None);
@@ -81,7 +76,7 @@ pub(crate) fn card(results: &Results<'_>, scheme: &str) -> Option<Card> {
         alone: alone.map(words::percent),
         lists_add: lists_add(results, scheme, alone.unwrap_or(0.0).max(blind)),
         break_even,
-        untried_today: !is_today(&findings),
+        untried_today,
         refused: refused.collect(),
         findings,
     })
@@ -284,7 +279,8 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     let unknown = (!names.is_empty())
         .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
     let today = largest(cards.iter().filter_map(Card::leak));
-    let known = worst(cards, Basis::Given).or_else(|| worst(cards, Basis::Oracle));
+    let worst = |basis| largest(cards.iter().filter_map(|card| card.finding(basis)));
+    let known = worst(Basis::Given).or_else(|| worst(Basis::Oracle));
     // The model may have fewer tracks than an attacker finds links.
     let every = every(cards).filter(|_| !results.is_sequence());
     let bearings = cards.iter().find_map(|card| card.bearings.clone());
@@ -406,7 +402,7 @@ pub(crate) fn hidden(cards: &[Card]) -> impl Iterator<Item = &Card> {
 /// Returns true if an attack on `scheme`, or on any scheme, is such a row.
 fn tried(results: &Results<'_>, scheme: Option<&str>, is_such: impl Fn(&Row) -> bool) -> bool {
     let mut rows = results.rows.iter().filter(|row| scheme.is_none_or(|name| name == row.scheme));
-    results.is_of_releases() || rows.any(is_such)
+    rows.any(is_such)
 }
 
 /// Returns true if the lists of such an attack are by one of the `sources`.
@@ -449,12 +445,14 @@ pub(crate) fn not_tried(results: &Results<'_>) -> Option<String> {
     if results.is_again() {
         return Some("Not tried: attacks on one release alone (unlift audit map).".to_owned());
     }
-    if results.is_of_releases() || results.rows.is_empty() {
-        let lacks_lists = results.is_sequence() && !has_lists(results);
-        return lacks_lists.then(|| {
+    if results.is_sequence() {
+        return (!has_lists(results)).then(|| {
             "Not tried: neighbors by descriptors within each query (--neighbors descriptors)."
                 .to_owned()
         });
+    }
+    if results.rows.is_empty() {
+        return None;
     }
     let images = results.is_of_images();
     let alone = images || results.rows.iter().any(|row| row.records_alone_percent.is_some());
@@ -488,10 +486,6 @@ fn every(cards: &[Card]) -> Option<String> {
     Some(format!("{when}, every scheme tried would give back {percent} or more."))
 }
 
-fn worst(cards: &[Card], basis: Basis) -> Option<&Finding> {
-    largest(cards.iter().filter_map(|card| card.finding(basis)))
-}
-
 fn largest<'c>(findings: impl Iterator<Item = &'c Finding>) -> Option<&'c Finding> {
     findings.reduce(|a, b| if b.recovered > a.recovered { b } else { a })
 }
@@ -501,19 +495,12 @@ fn attack_sentence(results: &Results<'_>, finding: &Finding) -> String {
     let within = results.within(results.headline);
     let what = format!("{} of the {points} of {subject} {within}", finding.in_words());
     let by = format!("{}, {}", finding.scheme, finding.briefly);
-    match finding.basis {
-        Basis::Released => {
-            let from = finding.when.trim_start_matches("Today, ");
-            format!("The strongest attack tried recovers {what} today, {from} ({by}).")
-        }
-        Basis::Given => {
-            format!("The strongest attack tried recovers {what} with given neighbors ({by}).")
-        }
-        Basis::Oracle => {
-            let known = finding.when.to_lowercase();
-            format!("The strongest attack tried would recover {what} {known} ({by}).")
-        }
-    }
+    let (recovers, from) = match finding.basis {
+        Basis::Released => ("recovers", finding.when.replacen("Today", "today", 1)),
+        Basis::Given => ("recovers", "with given neighbors".to_owned()),
+        Basis::Oracle => ("would recover", finding.when.to_lowercase()),
+    };
+    format!("The strongest attack tried {recovers} {what} {from} ({by}).")
 }
 
 /// Returns what a scheme that publishes bearings shows; `None` for others. Recovered points say nothing about it: all bearings

@@ -42,10 +42,7 @@ fn the_cost_of_protection_has_a_sentence_a_chart_and_a_table() {
     assert!(by_oracle.contains("Nothing is decided about olc."));
     let document = |protects| {
         let mut document = document(protects);
-        for row in &mut document.results {
-            (row.neighbors, row.oracle_noise) = ("descriptors".to_owned(), None);
-            row.solver = row.solver.replace("consensus", "joint");
-        }
+        sample::by_best(&mut document, "oracle");
         document
     };
     let none = page(&document(false), None, false);
@@ -98,9 +95,8 @@ fn changed_descriptors_have_no_known_cost_without_held_out_images() {
 #[test]
 fn a_scheme_that_does_not_localize_is_no_advice() {
     let mut document = document(false);
+    sample::by_best(&mut document, "oracle");
     for row in &mut document.results {
-        (row.neighbors, row.oracle_noise) = ("descriptors".to_owned(), None);
-        row.solver = row.solver.replace("consensus", "joint");
         sample::set(row, if row.scheme == "plane" { 5.0 } else { 12.0 }, 1.0);
     }
     let text = page(&document, None, false);
@@ -166,7 +162,7 @@ fn an_attack_of_the_new_audit_alone_counts_if_it_recovers_more() {
     for (percent, passes) in [(5.0, true), (99.0, false)] {
         let mut new = old.clone();
         let mut row = new.results[0].clone();
-        (row.neighbors, row.oracle_noise) = ("file".to_owned(), None);
+        sample::by(&mut row, "file");
         sample::set(&mut row, percent, 1.0);
         new.results.push(row);
         let found = compare(&old, &new, None).unwrap();
@@ -176,7 +172,7 @@ fn an_attack_of_the_new_audit_alone_counts_if_it_recovers_more() {
     let mut new = old.clone();
     let mut row =
         new.results.iter().find(|row| row.records_alone_percent.is_some()).unwrap().clone();
-    (row.neighbors, row.oracle_noise) = ("file".to_owned(), None);
+    sample::by(&mut row, "file");
     row.recovered_percent = row.records_alone_percent.clone().unwrap();
     new.results.push(row);
     assert!(compare(&old, &new, None).unwrap().passed);
@@ -202,7 +198,8 @@ fn painted_document() -> Document {
     }
     for scheme in ["lines2d", "cp2d"] {
         let mut row = document.results.iter().find(|row| row.scheme == scheme).unwrap().clone();
-        (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.2);
+        sample::by(&mut row, "overlap");
+        row.inlier_ratio = 0.2;
         document.results.push(row);
     }
     // Rows of images must match the results in number, or be absent.

@@ -1,7 +1,7 @@
 //! A synthetic audit of a synthetic room, and of images. No figure was measured.
 
-use indexmap::IndexMap;
 use unlift::Unit;
+use unlift::seed::{Draws, Stage};
 use unlift_report::ByAttack;
 use unlift_report::document::*;
 use unlift_report::pictures::{Graph, Marks, Picture, ReleasedView};
@@ -45,9 +45,10 @@ pub fn document(metric: bool) -> Document {
     let break_even = ["consensus", "ransac"].into_iter().flat_map(|solver| {
         (0..7).flat_map(move |s| thresholds.map(|threshold| point(s, solver, threshold)))
     });
-    let rows = vec![IndexMap::from([("recover".into(), 0.31)]); results.len()];
-    let text = serde_json::json!({
-        "unlift": "0.1.0", "schema": SCHEMA, "seed": 0, "results": [], "break_even": [],
+    let rows = vec![serde_json::json!({"recover": 0.31}); results.len()];
+    let document = serde_json::json!({
+        "unlift": "0.1.0", "schema": SCHEMA, "seed": 0, "results": results,
+        "break_even": break_even.collect::<Vec<_>>(),
         "input": {
             "path": "maps/furnished-room/sparse/0", "sha256": "9f86d081", "n_points": 21_149,
             "scale_m_per_unit": metric.then_some(1.0), "unit_in_map_units": if metric { 1.0 } else { 0.0834 },
@@ -60,14 +61,10 @@ pub fn document(metric: bool) -> Document {
         ],
         "run": {
             "command": "unlift audit map maps/furnished-room --scale 1 --solver consensus", "threads": 2,
-            "peak_memory_bytes": 412_000_000, "seconds": {"total": 41.7, "rows": []},
+            "peak_memory_bytes": 412_000_000, "seconds": {"total": 41.7, "rows": rows},
         },
     });
-    let mut document = Document::from_json(&text.to_string()).expect("a document");
-    document.break_even = break_even.collect();
-    document.results = results;
-    document.run.seconds.rows = rows;
-    document
+    serde_json::from_value(document).expect("a document")
 }
 
 /// Changes the rows of a scheme.
@@ -80,6 +77,19 @@ pub fn set(row: &mut Row, recovered: f64, blind: f64) {
     row.recovered_percent.values_mut().for_each(|percent| *percent = recovered);
     row.blind_percent.values_mut().for_each(|percent| *percent = blind);
     (row.records_alone_percent, row.records_alone_by) = (None, None);
+}
+
+/// Makes a row one by another source than the oracle.
+pub fn by(row: &mut Row, source: &str) {
+    (row.neighbors, row.oracle_noise) = (source.to_owned(), None);
+}
+
+/// Makes rows by `source` those of the best attack by descriptors.
+pub fn by_best(document: &mut Document, source: &str) {
+    for row in document.results.iter_mut().filter(|row| row.neighbors == source) {
+        by(row, "descriptors");
+        row.solver = row.solver.replace("consensus", "joint");
+    }
 }
 
 /// Keeps the rows of some schemes.
@@ -173,9 +183,7 @@ pub fn mixed(metric: bool) -> Document {
 
 /// Returns a number in 0..1 from a counter.
 fn random(counter: usize) -> f32 {
-    let mut z = (counter + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    ((z ^ (z >> 27)) >> 40) as f32 / (1u64 << 24) as f32
+    Draws::new(0, Stage::Shapes, counter as u64).unit() as f32
 }
 
 /// Returns points of a room and their recovered positions, consistent with the figures of `document`.

@@ -89,14 +89,13 @@ impl Extractor {
     /// If an option is out of range or a model is missing; the error names it.
     pub fn try_new(options: &Extraction) -> Result<Self, Error> {
         options.check()?;
+        let learned = |name, extract, noise_px| {
+            Network::load(name).map(|network| Method::Learned(network, extract, noise_px))
+        };
         let method = match options.kind {
             DescriptorKind::Sift => Method::Sift(Sift::try_new(*options)?),
-            DescriptorKind::Aliked => {
-                Method::Learned(Network::load("aliked-n16rot")?, aliked, DETECTION_NOISE)
-            }
-            DescriptorKind::SuperPoint => {
-                Method::Learned(Network::load("superpoint")?, superpoint, SUPERPOINT_NOISE)
-            }
+            DescriptorKind::Aliked => learned("aliked-n16rot", aliked, DETECTION_NOISE)?,
+            DescriptorKind::SuperPoint => learned("superpoint", superpoint, SUPERPOINT_NOISE)?,
         };
         Ok(Self { options: *options, method, turn: Turn::Upright })
     }

@@ -257,25 +257,3 @@ impl Folders {
         Error::new(entry.file(), format!("in {place} ({})", entry.owner), "nothing")
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    #[test]
-    fn the_given_folder_comes_first() {
-        let place = tempfile::tempdir().unwrap();
-        let [given, user] = ["given", "user"].map(|name| place.path().join(name));
-        fs::create_dir(&given).unwrap();
-        let folders = Folders { given: Some(given.clone()), user: Some(user.clone()) };
-        let entry = &MODELS[0];
-        assert_eq!(folders.find(entry), Ok(None));
-        fs::create_dir(&user).unwrap();
-        for folder in [user, given] {
-            let file = folder.join(entry.file());
-            fs::write(&file, "a model").unwrap();
-            assert_eq!(folders.find(entry), Ok(Some(file)));
-        }
-    }
-}

@@ -131,22 +131,21 @@ pub struct Inverter {
 }
 
 impl Inverter {
-    /// Loads the inverter of descriptors of `kind`.
+    /// Loads the inverter of descriptors of `kind` from a file, or the known one.
+    ///
+    /// A file is as `training/inversion` exports it: input `features`, which is a [`feature_image`]
+    /// (`colored` for SIFT), output `picture` `(1, 3, 2 h, 2 w)`.
     ///
     /// # Errors
-    /// If it is neither embedded nor in the user's folders, or its file cannot be loaded.
-    pub fn of(kind: DescriptorKind) -> Result<Self, Error> {
-        Ok(Self { kind, network: Network::load(&model(kind))? })
-    }
-
-    /// Loads an inverter from a file, as `training/inversion` exports it: input `features`, which
-    /// is a [`feature_image`] (`colored` for SIFT), output `picture` `(1, 3, 2 h, 2 w)`.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or has other inputs and outputs.
-    pub fn read(path: &Path, kind: DescriptorKind) -> Result<Self, Error> {
-        let entry = Entry { sha256: None, ..*entry(&model(kind))? };
-        Ok(Self { kind, network: Network::read(path, &entry)? })
+    /// If the file cannot be read, or has other inputs and outputs, or the known one is neither
+    /// embedded nor in the user's folders.
+    pub fn open(kind: DescriptorKind, file: Option<&Path>) -> Result<Self, Error> {
+        let entry = entry(&format!("inverter-{}", kind.name()))?;
+        let network = match file {
+            Some(path) => Network::read(path, &Entry { sha256: None, ..*entry }),
+            None => Network::load(entry.name),
+        };
+        Ok(Self { kind, network: network? })
     }
 
     /// Returns the SHA-256 of the model, in hexadecimal.
@@ -159,7 +158,14 @@ impl Inverter {
     /// # Errors
     /// If the descriptors are of another kind, and when [`feature_image`] returns an error.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
-        self.takes(points.descriptors)?;
+        let kind = match points.descriptors.is_empty() {
+            true => self.kind,
+            false => DescriptorKind::of(points.descriptors, "pictures")?,
+        };
+        if kind != self.kind {
+            let expected = format!("descriptors of the network's kind ({:?})", self.kind);
+            return Err(Error::new("pictures", expected, format!("{kind:?}")));
+        }
         let features = feature_image(points, size, self.kind == DescriptorKind::Sift)?;
         let [picture] = self.network.run(vec![("features", features)], ["picture"])?;
         let [width, height] = size.map(|side| side / 2);
@@ -179,20 +185,4 @@ impl Inverter {
             }
         }
     }
-
-    fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        let kind = match descriptors.is_empty() {
-            true => self.kind,
-            false => DescriptorKind::of(descriptors, "pictures")?,
-        };
-        if kind == self.kind {
-            return Ok(());
-        }
-        let expected = format!("descriptors of the network's kind ({:?})", self.kind);
-        Err(Error::new("pictures", expected, format!("{kind:?}")))
-    }
-}
-
-fn model(kind: DescriptorKind) -> String {
-    format!("inverter-{}", kind.name())
 }

@@ -71,10 +71,7 @@ impl Painter {
     /// # Errors
     /// If a network is missing or cannot be read.
     pub fn open(kind: DescriptorKind, network: Option<&Path>) -> Result<Self, Error> {
-        let inverter = match network {
-            Some(path) => Inverter::read(path, kind),
-            None => Inverter::of(kind),
-        };
+        let inverter = Inverter::open(kind, network);
         let (lpips, detector) = (Lpips::try_new()?, Detector::try_new()?);
         Ok(Self { inverter: inverter?, lpips, detector })
     }
@@ -244,17 +241,16 @@ fn in_sight(
     positions: &[Option<[f64; 3]>],
     weight: impl Fn(usize, f32) -> f32,
 ) -> Result<(Projection, Vec<f32>), Error> {
+    let weight = |(slot, depth): (&u32, &f32)| weight(*slot as usize, *depth);
     let all = view.project(positions)?;
-    let of = |at: usize| weight(all.points[at] as usize, all.depths[at]);
-    let kept = all.only(|at| of(at) > 0.0);
-    let visible = kept.visible(view.size);
-    let weights = (kept.points.iter().zip(&kept.depths).zip(visible))
-        .map(
-            |((&slot, &depth), is_visible)| {
-                if is_visible { weight(slot as usize, depth) } else { 0.0 }
-            },
-        )
-        .collect();
+    let mut weights: Vec<f32> = all.points.iter().zip(&all.depths).map(weight).collect();
+    let kept = all.only(|at| weights[at] > 0.0);
+    weights.retain(|weight| *weight > 0.0);
+    for (weight, is_visible) in weights.iter_mut().zip(kept.visible(view.size)) {
+        if !is_visible {
+            *weight = 0.0;
+        }
+    }
     Ok((kept, weights))
 }
 

@@ -117,6 +117,21 @@ fn a_missing_model_and_an_unknown_name_are_one_line() {
 }
 
 #[test]
+fn the_given_folder_comes_first() {
+    let place = tempfile::tempdir().unwrap();
+    let [given, user] = ["given", "user"].map(|name| place.path().join(name));
+    fs::create_dir(&given).unwrap();
+    let folders = Folders { given: Some(given.clone()), user: Some(user.clone()) };
+    assert_eq!(folders.find(aliked()), Ok(None));
+    fs::create_dir(&user).unwrap();
+    for folder in [user, given] {
+        let file = folder.join(aliked().file());
+        fs::write(&file, "a model").unwrap();
+        assert_eq!(folders.find(aliked()), Ok(Some(file)));
+    }
+}
+
+#[test]
 fn inputs_that_do_not_fit_are_one_line() {
     let network = Network::load("aliked-n16rot").unwrap();
     let image =

@@ -141,8 +141,8 @@ impl Levels {
     fn between(&self, x: f32, y: f32, out: &mut [f32]) {
         out.fill(0.0);
         let mut pixel = [0.0; DIM];
-        for ([x, y], weight) in corners(x, y) {
-            self.pixel(x, y, &mut pixel);
+        for ([x, y], weight) in corners([x, y], self.size) {
+            self.pixel(x as isize, y as isize, &mut pixel);
             out.iter_mut().zip(&pixel).for_each(|(out, value)| *out += weight * value);
         }
     }

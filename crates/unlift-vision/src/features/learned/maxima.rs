@@ -21,11 +21,8 @@ impl Scores {
             values.iter().zip(largest(values)).map(|(a, b)| *a == b).collect();
         for _ in 0..2 {
             let hidden = windows(&taken, width, radius, |a, b| a | b);
-            let rest: Vec<f32> = values
-                .iter()
-                .zip(&hidden)
-                .map(|(v, hidden)| if *hidden { 0.0 } else { *v })
-                .collect();
+            let shown = |(value, hidden): (&f32, &bool)| if *hidden { 0.0 } else { *value };
+            let rest: Vec<f32> = values.iter().zip(&hidden).map(shown).collect();
             let maxima = rest.iter().zip(largest(&rest)).map(|(a, b)| *a == b);
             for ((taken, hidden), maximum) in taken.iter_mut().zip(hidden).zip(maxima) {
                 *taken |= maximum && !hidden;
@@ -42,28 +39,30 @@ impl Scores {
     }
 
     /// Returns the bilinearly interpolated score at a position; 0 outside.
-    pub(crate) fn at(&self, [x, y]: [f32; 2]) -> f32 {
-        corners(x, y)
-            .into_iter()
-            .filter(|&([x, y], _)| {
-                (0..self.width as isize).contains(&x) && (0..self.height as isize).contains(&y)
-            })
-            .map(|([x, y], weight)| weight * self.values[y as usize * self.width + x as usize])
-            .sum()
+    pub(crate) fn at(&self, place: [f32; 2]) -> f32 {
+        let corners = corners(place, [self.width, self.height]);
+        corners.map(|([x, y], weight)| weight * self.values[y * self.width + x]).sum()
     }
 }
 
-/// Returns the four pixels around a position and their bilinear weights.
-pub(crate) fn corners(x: f32, y: f32) -> [([isize; 2], f32); 4] {
+/// Returns those of the four pixels around a position that are in a map of `size` (width, height),
+/// and their bilinear weights.
+pub(crate) fn corners(
+    [x, y]: [f32; 2],
+    size: [usize; 2],
+) -> impl Iterator<Item = ([usize; 2], f32)> {
     let (left, top) = (x.floor(), y.floor());
     let (right, bottom) = (x - left, y - top);
     let (column, row) = (left as isize, top as isize);
-    [
+    let all = [
         ([column, row], (1.0 - right) * (1.0 - bottom)),
         ([column + 1, row], right * (1.0 - bottom)),
         ([column, row + 1], (1.0 - right) * bottom),
         ([column + 1, row + 1], right * bottom),
-    ]
+    ];
+    // Negative numbers become large ones.
+    let all = all.map(|(pixel, weight)| (pixel.map(|at| at as usize), weight));
+    all.into_iter().filter(move |(pixel, _)| pixel[0] < size[0] && pixel[1] < size[1])
 }
 
 /// Returns the largest value within `radius` columns and rows of every pixel of a map.

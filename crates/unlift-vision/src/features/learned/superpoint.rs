@@ -74,16 +74,13 @@ fn gray([red, green, blue]: [u8; 3]) -> f32 {
 fn describe(coarse: &Tensor, place: [usize; 2], size: [usize; 2], out: &mut [f32]) {
     let dim = out.len();
     let cells = [coarse.shape()[2], coarse.shape()[1]];
-    let [x, y] = [0, 1].map(|side| {
+    let place = [0, 1].map(|side| {
         let middle = (CELL as f32 - 1.0) / 2.0;
         let share = (place[side] as f32 - middle) / (size[side] as f32 - (CELL as f32 + 1.0) / 2.0);
         share * (cells[side] - 1) as f32
     });
-    for ([x, y], weight) in corners(x, y) {
-        if !(0..cells[0] as isize).contains(&x) || !(0..cells[1] as isize).contains(&y) {
-            continue;
-        }
-        let at = (y as usize * cells[0] + x as usize) * dim;
+    for ([x, y], weight) in corners(place, cells) {
+        let at = (y * cells[0] + x) * dim;
         let cell = &coarse.values()[at..at + dim];
         out.iter_mut().zip(cell).for_each(|(out, value)| *out += weight * value);
     }

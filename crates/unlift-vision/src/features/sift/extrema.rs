@@ -57,12 +57,8 @@ impl Kernel for Differences<'_> {
         let (width, height) = (levels[0].width, levels[0].height);
         for y in 1..height.saturating_sub(1) {
             let rows = [levels[0].row(y), levels[1].row(y), levels[2].row(y), levels[3].row(y)];
-            let across = [
-                levels[1].row(y - 1),
-                levels[2].row(y - 1),
-                levels[1].row(y + 1),
-                levels[2].row(y + 1),
-            ];
+            let across = [(1, y - 1), (2, y - 1), (1, y + 1), (2, y + 1)];
+            let across = across.map(|(level, y)| levels[level].row(y));
             for start in (1..width.saturating_sub(1)).step_by(BLOCK) {
                 if !strong(rows[1], rows[2], start) {
                     continue;

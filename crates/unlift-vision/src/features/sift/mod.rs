@@ -52,19 +52,15 @@ pub struct Features {
 /// per pixel of the doubled image: 30 MB for 640 x 480, 740 MB for 3200 x 2400 (larger images are
 /// downsized). The same pixels give the same bytes on any machine, unless they are downsized.
 ///
+/// The default has COLMAP's options.
+///
 /// Source: D. Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004; details
 /// that it leaves open follow the documentation of VLFeat and COLMAP.
+#[derive(Default)]
 pub struct Sift {
     options: Extraction,
     ladder: Ladder,
     idle: Mutex<Vec<Workspace>>,
-}
-
-impl Default for Sift {
-    /// Uses COLMAP's defaults.
-    fn default() -> Self {
-        Self { options: Extraction::SIFT, ladder: Ladder::new(), idle: Mutex::default() }
-    }
 }
 
 #[derive(Default)]

@@ -189,8 +189,8 @@ pub(crate) struct Ladder {
     steps: Vec<Vec<f32>>,
 }
 
-impl Ladder {
-    pub(crate) fn new() -> Self {
+impl Default for Ladder {
+    fn default() -> Self {
         let ratio = libm::exp2(1.0 / LEVELS as f64);
         // The image is doubled.
         let nominal = 2.0 * NOMINAL;
