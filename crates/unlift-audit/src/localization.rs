@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use unlift::Error as CoreError;
 use unlift::audit::Plan;
 use unlift::geometry::knn::Knn;
 use unlift::localization::{Held, Localization, NEAR, Photo, View, of_schemes};
 use unlift::obfuscate::Protection;
 use unlift::truth::Original;
-use unlift::{Descriptors, Error as CoreError};
 use unlift_io::read::{Cameras, colmap};
 use unlift_vision::features::Extraction;
 use unlift_vision::features::photo::Turn;
@@ -84,7 +84,20 @@ pub fn open<'a>(
         let Some(descriptors) = features.descriptors else {
             return Err(CoreError::new("features", "descriptors", "none").into());
         };
-        Ok::<_, Error>(Ok(photo((at, view), &lens, &features.keypoints, descriptors, positions)))
+        let nearby = Knn::new(&features.keypoints).ok();
+        let of_point = |&row: &u32| {
+            let place = lens.project(view.camera.pose.in_camera(&positions[row as usize]))?;
+            Some((row as usize, nearby.as_ref()?.nearest_within(place, NEAR)?.1))
+        };
+        let of_points = view.observed.iter().filter_map(of_point).collect();
+        // The keypoints as the view would have them without a lens.
+        let flat = |(row, place): (usize, &[f64; 2])| {
+            let place = lens.undistorted(&view.camera.intrinsics, *place)?;
+            let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
+            is_inside.then_some((place, row))
+        };
+        let places = features.keypoints.iter().enumerate().filter_map(flat).collect();
+        Ok::<_, Error>(Ok(Photo { view: at, places, descriptors, of_points }))
     };
     let mut photos = Vec::new();
     for found in images.par_iter().map(read).collect::<Vec<_>>() {
@@ -96,27 +109,4 @@ pub fn open<'a>(
     photos.sort_by(|a, b| cameras.images[a.view].0.cmp(&cameras.images[b.view].0));
     Ok(Held::new(original, &cameras.views, photos, nth)
         .map_err(|e| unlift_io::Error::core(path, e))?)
-}
-
-/// Returns the keypoints of a photo as its view would have them without a lens.
-fn photo(
-    (number, view): (usize, &View),
-    lens: &Lens,
-    keypoints: &[[f64; 2]],
-    descriptors: Descriptors,
-    positions: &[[f64; 3]],
-) -> Photo {
-    let nearby = Knn::new(keypoints).ok();
-    let of_points = view.observed.iter().filter_map(|&row| {
-        let place = lens.project(view.camera.pose.in_camera(&positions[row as usize]))?;
-        Some((row as usize, nearby.as_ref()?.nearest_within(place, NEAR)?.1))
-    });
-    let of_points = of_points.collect();
-    let flat = |(row, place): (usize, &[f64; 2])| {
-        let place = lens.undistorted(&view.camera.intrinsics, *place)?;
-        let is_inside = (0..2).all(|c| (0.0..=view.size[c]).contains(&place[c]));
-        is_inside.then_some((place, row))
-    };
-    let places = keypoints.iter().enumerate().filter_map(flat).collect();
-    Photo { view: number, places, descriptors, of_points }
 }

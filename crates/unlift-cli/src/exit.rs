@@ -3,8 +3,7 @@
 use unlift::{OneLine, is_obeyed};
 
 use crate::args::Cli;
-use crate::output::printed;
-use crate::stderr::tell;
+use crate::output::{printed, tell};
 use crate::words;
 
 /// Exit code if more points come back than a gate allows.

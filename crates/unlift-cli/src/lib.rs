@@ -8,7 +8,6 @@ mod demo;
 mod exit;
 mod output;
 mod progress;
-mod stderr;
 mod values;
 
 use std::ffi::OsString;

@@ -10,7 +10,7 @@ use indicatif::{
 };
 use unlift::OneLine;
 
-use crate::stderr::tell;
+use crate::output::tell;
 
 /// Work that takes less time shows no progress.
 const PATIENCE: Duration = Duration::from_secs(1);

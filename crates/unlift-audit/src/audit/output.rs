@@ -63,6 +63,7 @@ impl Audit {
         }
         let Attacked { document, mut seconds, rendering, .. } = attacked;
         let doubts = document.doubts.iter().cloned();
+        let doubts = doubts.chain(attacked.doubts.into_iter().flatten()).collect();
         // Some attacks measure no time per row.
         seconds.rows.resize_with(document.results.len(), Default::default);
         let document = Document {
@@ -71,10 +72,7 @@ impl Audit {
             gates,
             seed: plan.seed,
             not_audited: not_audited(plan, &attacked.not_audited),
-            doubts: distinct(
-                doubts.chain(attacked.doubts.into_iter().flatten()).collect(),
-                String::eq,
-            ),
+            doubts: distinct(doubts, String::eq),
             run: self.output.record(&seconds),
             ..document
         };

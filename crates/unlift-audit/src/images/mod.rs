@@ -72,14 +72,9 @@ impl FeatureSource {
         let others = listing.others.iter().map(|(ending, n)| format!("{n} .{ending}"));
         let others = others.collect::<Vec<_>>().join(", ");
         if listing.photos.is_empty() {
-            return Err(match listing.refused.pop() {
-                Some(refused) => refused,
-                None => {
-                    let found = if others.is_empty() { "none" } else { &format!("only {others}") };
-                    unlift_io::Error::new(root, "", "JPEG, PNG or WebP photos", found)
-                }
-            }
-            .into());
+            let found = if others.is_empty() { "none" } else { &format!("only {others}") };
+            let none = || unlift_io::Error::new(root, "", "JPEG, PNG or WebP photos", found);
+            return Err(listing.refused.pop().unwrap_or_else(none).into());
         }
         let root = root.display();
         let passed_over = format!("{root}: passed over {others}: only JPEG, PNG and WebP are read");

@@ -48,7 +48,8 @@ pub struct MapInversion {
 
 impl MapInversion {
     /// Opens the photos of a map, which must be a COLMAP model with descriptors. Uses at most `max_images` of its images that have a
-    /// photo in `photos`, evenly spaced over their names. `network` is that of the user.
+    /// photo in `photos`, evenly spaced over their names. `network` is that of the user. With a `ratio`, paints the oracle's recoveries
+    /// at this inlier ratio only.
     ///
     /// Cameras with an unknown lens and unusable photos are reported and skipped.
     ///
@@ -59,6 +60,7 @@ impl MapInversion {
         photos: Option<&Path>,
         network: Option<&Path>,
         max_images: usize,
+        ratio: Option<f64>,
         progress: &dyn Progress,
     ) -> Result<Self, crate::Error> {
         let missing = |what: &str| crate::Error::request(format!("--invert: expected {what}"));
@@ -95,13 +97,7 @@ impl MapInversion {
         }
         let small = |of: &PhotoView| (of.photo.name.clone(), Gallery::reduced(&of.photo.image));
         let gallery = Gallery::new(views.iter().take(Gallery::MAX).map(small).collect());
-        Ok(Self { painter, views, gallery, ratio: None, last: Mutex::default() })
-    }
-
-    /// Paints the oracle's recoveries at this inlier ratio only.
-    #[must_use]
-    pub fn at_ratio(self, ratio: f64) -> Self {
-        Self { ratio: Some(ratio), ..self }
+        Ok(Self { painter, views, gallery, ratio, last: Mutex::default() })
     }
 
     fn paints(&self, row: &Row) -> bool {
@@ -203,7 +199,7 @@ fn records(cell: &Cell<'_>) -> (Shapes, [f64; 3]) {
 
 fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error> {
     let place = |p: [f32; 3]| Some([0, 1, 2].map(|c| f64::from(p[c]) + middle[c]));
-    let line = |a: [f32; 3], b: [f32; 3]| -> Result<Option<[[f32; 2]; 2]>, Error> {
+    let line = |[a, b]: [[f32; 3]; 2]| -> Result<Option<[[f32; 2]; 2]>, Error> {
         let at = |step: u32| {
             let t = step as f32 / STEPS as f32;
             place([0, 1, 2].map(|c| a[c] + t * (b[c] - a[c])))
@@ -211,20 +207,20 @@ fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error
         let projected = view.project(&(0..=STEPS).map(at).collect::<Vec<_>>())?.places;
         Ok(projected.first().zip(projected.last()).map(|(&from, &to)| [from, to]))
     };
-    Ok(match shapes {
-        Shapes::Segments(all) => {
-            Marks::Lines(all.iter().map(|&[a, b]| line(a, b)).collect::<Result<_, _>>()?)
-        }
+    let segments = match shapes {
+        Shapes::Segments(all) => all.clone(),
         Shapes::Patches(all) => {
             let edges =
-                all.iter().flat_map(|patch| (0..4).map(|at| (patch[at], patch[(at + 1) % 4])));
-            Marks::Lines(edges.map(|(a, b)| line(a, b)).collect::<Result<_, _>>()?)
+                |p: &[[f32; 3]; 4]| [[p[0], p[1]], [p[1], p[2]], [p[2], p[3]], [p[3], p[0]]];
+            all.iter().flat_map(edges).collect()
         }
         Shapes::Points(all) => {
             let points: Vec<_> = all.iter().map(|&p| place(p)).collect();
-            Marks::Points(view.project(&points)?.places.into_iter().map(Some).collect())
+            let places = view.project(&points)?.places;
+            return Ok(Marks::Points(places.into_iter().map(Some).collect()));
         }
-    })
+    };
+    Ok(Marks::Lines(segments.into_iter().map(line).collect::<Result<_, _>>()?))
 }
 
 fn open_photo(

@@ -85,12 +85,13 @@ impl Prepared {
         }
     }
 
-    /// Checks that the longest side of the map, in meters at this `scale`, is in a range.
+    /// Checks that the longest side of the map, in meters at this `scale`, is in a range, if one is given.
     pub fn check_extent(
         &self,
-        (low, high): (f64, f64),
+        range: Option<(f64, f64)>,
         scale: Option<f64>,
     ) -> Result<(), crate::Error> {
+        let Some((low, high)) = range else { return Ok(()) };
         let input = Input { scale_m_per_unit: scale, ..Input::default() };
         let input = with_sides(input, self.original.reveal());
         let is_within =
@@ -138,18 +139,11 @@ pub fn open(
     })?;
     check_scale(&input.positions, preparation.scale)?;
     let mut remarks = Remarks { notes: input.notes.clone(), doubts: input.doubts.clone() };
-    let mut described = None;
-    if let Some(file) = descriptors {
-        described = Some((read::descriptors(file, &input)?, file.to_owned()));
-    } else if preparation.beside {
-        match beside(&input) {
-            Ok((rows, file)) => {
-                remarks.notes.push(format!("descriptors: {}, beside the model", file.display()));
-                described = Some((rows, file));
-            }
-            Err(reasons) => remarks.doubts.extend(reasons),
-        }
-    }
+    let described = match descriptors {
+        Some(file) => Some((read::descriptors(file, &input)?, file.to_owned())),
+        None if preparation.beside => beside(&input, &mut remarks),
+        None => None,
+    };
     let (rows, file) = described.unzip();
     let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
         let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
@@ -176,16 +170,20 @@ pub fn open(
     Ok(Prepared { remarks, descriptors_file: file, input, ..prepared })
 }
 
-/// Reads the first file beside the model of `input` that has the descriptors of its points; returns why none of them has.
-fn beside(input: &read::Input) -> Result<(Descriptors, PathBuf), Vec<String>> {
+/// Reads the first file beside the model of `input` that has the descriptors of its points. Remarks which one has, or why none has.
+fn beside(input: &read::Input, remarks: &mut Remarks) -> Option<(Descriptors, PathBuf)> {
     let mut reasons = Vec::new();
-    let read = |file: &PathBuf| {
-        let rows = read::descriptors(file, input);
-        rows.map_err(|error| reasons.push(format!("descriptors: {error}")))
-            .ok()
-            .map(|rows| (rows, file.clone()))
-    };
-    input.beside.iter().find_map(read).ok_or(reasons)
+    for file in &input.beside {
+        match read::descriptors(file, input) {
+            Ok(rows) => {
+                remarks.notes.push(format!("descriptors: {}, beside the model", file.display()));
+                return Some((rows, file.clone()));
+            }
+            Err(error) => reasons.push(format!("descriptors: {error}")),
+        }
+    }
+    remarks.doubts.extend(reasons);
+    None
 }
 
 /// Returns `rows` among all points of the file, which may contain points that the reader left out.

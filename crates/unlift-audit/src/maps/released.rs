@@ -5,7 +5,7 @@ use std::path::Path;
 use unlift::audit::doubts::of_descriptors;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
-use unlift::{Descriptors, Fingerprint, PointSet};
+use unlift::{Fingerprint, PointSet};
 use unlift_io::Error as FileError;
 use unlift_io::hash::{hash_file, hash_files, hash_positions};
 use unlift_io::read::{self, Input as Points};
@@ -57,22 +57,21 @@ impl Files<'_> {
     /// Reads the files, and checks that they belong together.
     pub fn open(&self) -> Result<Release, Error> {
         if has_images(self.released)? {
-            let found = "released images";
-            let error = FileError::new(self.released, "", "a released map", found);
+            let error = FileError::new(self.released, "", "a released map", "released images");
             let advice = "unlift recover and unlift evaluate, which take images, too";
             return Err(Error::from(error).advise(advice));
         }
         let released = read_released::<3>(self.released)?;
         let (original, secret) = read_truth::<3>(self.truth)?;
-        same_map(self.released, Some(released.fingerprint()), self.truth, secret.map())?;
-        expect_slots(self.released, &released, &secret)?;
-        let of_points = self.of_points(&released, &secret)?;
-        let released = self.described(released, &secret, of_points.as_ref())?;
+        expect_truth(self.released, &released, self.truth, &secret)?;
+        let released = self.described(released, &secret)?;
         // Other schemes hide the points of this release, so that figures are of equal points.
         let (secret, kept) = secret.with_map(Some(released.fingerprint())).of_hidden();
         let rows: Vec<u32> = kept.iter().map(|id| id.0).collect();
         let points = original.reveal();
-        let truth_sha256 = hash_in_any_order(points);
+        let mut sorted = points.positions().to_vec();
+        sorted.sort_unstable_by(|a, b| a.partial_cmp(b).expect("finite positions"));
+        let truth_sha256 = hash_positions(&sorted);
         let positions = rows.iter().map(|&row| points.positions()[row as usize]).collect();
         let hidden = PointSet::try_new(positions, points.unit());
         let hidden = hidden.map_err(|error| FileError::core(self.truth, error))?;
@@ -97,32 +96,16 @@ impl Files<'_> {
         Ok(Release { prepared, hidden: (released, secret), truth_sha256 })
     }
 
-    /// Reads the file of descriptors, if there is one.
-    fn of_points(
-        &self,
-        released: &Released<3>,
-        secret: &Secret,
-    ) -> Result<Option<Descriptors>, Error> {
-        let Some(path) = self.descriptors else { return Ok(None) };
+    /// Returns the released map with its descriptors among those of all points, if there is a file of these.
+    fn described(&self, released: Released<3>, secret: &Secret) -> Result<Released<3>, Error> {
+        let Some(path) = self.descriptors else { return Ok(released) };
         if released.descriptors().is_some() {
             let path = self.released.display();
             bail!("--descriptors: expected with a released map without, found some in {path}");
         }
         // Only the ids of the points are needed.
         let ids = (0..secret.n_originals() as u64).collect();
-        Ok(Some(read::descriptors(path, &Points { ids, ..Points::default() })?))
-    }
-
-    /// Returns the released map with its descriptors among those of all points, if these are given.
-    fn described(
-        &self,
-        released: Released<3>,
-        secret: &Secret,
-        of_points: Option<&Descriptors>,
-    ) -> Result<Released<3>, Error> {
-        let (Some(path), Some(of_points)) = (self.descriptors, of_points) else {
-            return Ok(released);
-        };
+        let of_points = read::descriptors(path, &Points { ids, ..Points::default() })?;
         let mut of_rows = vec![0; secret.n_slots()];
         for (slot, &row) in secret.descriptor_row().iter().enumerate() {
             of_rows[row as usize] = secret.hidden()[slot].0;
@@ -153,12 +136,6 @@ impl Files<'_> {
             ..Input::default()
         })
     }
-}
-
-fn hash_in_any_order(points: &PointSet<3>) -> String {
-    let mut positions = points.positions().to_vec();
-    positions.sort_unstable_by(|a, b| a.partial_cmp(b).expect("finite positions"));
-    hash_positions(&positions)
 }
 
 /// Returns the slot of each original; `None` if it is not hidden.
@@ -196,12 +173,15 @@ pub fn same_map(
     }
 }
 
-/// Returns an error if the released map and the truth differ in the number of hidden points, in total or per record.
-pub fn expect_slots<const D: usize>(
+/// Returns an error if the released map at `path` is not that of the truth in the file `of`, or if they differ in the number of hidden
+/// points, in total or per record.
+pub fn expect_truth<const D: usize>(
     path: &Path,
     released: &Released<D>,
+    of: &Path,
     secret: &Secret,
 ) -> Result<(), FileError> {
+    same_map(path, Some(released.fingerprint()), of, secret.map())?;
     for (expected, found, what) in [
         (secret.n_slots(), released.n_slots(), ""),
         (secret.slots_per_record(), released.slots_per_record(), " per record"),

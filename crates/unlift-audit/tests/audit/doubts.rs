@@ -14,10 +14,10 @@ use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, OriginalId, Secret};
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_audit::{Audited, Error, Hidden, Input, Map, Preparation, Prepared, prepare};
+use unlift_audit::{Audited, Error, Hidden, Input, Map, Prepared};
 use unlift_io::read;
 
-use crate::{audited, schemes};
+use crate::{audited, plan, prepared, schemes};
 
 const N: usize = 1500;
 
@@ -25,26 +25,10 @@ fn room() -> Vec<[f64; 3]> {
     unlift::synthetic::room(1, N).points
 }
 
-fn prepared(points: &[[f64; 3]]) -> Prepared {
-    let preparation = Preparation { scale: Some(1.0), k: 20, ..Preparation::default() };
-    prepare(points, None, &preparation).unwrap()
-}
-
 /// Hides points under `olc`.
 fn hidden(points: Vec<[f64; 3]>, unit: Unit) -> (Released<3>, Secret) {
     let original = Original::new(PointSet::try_new(points, unit).unwrap());
     obfuscate(&*schemes(&["olc"], unit)[0], &original, None, &Key::from_seed(1)).unwrap()
-}
-
-fn plan(names: &[&str]) -> Plan<3> {
-    Plan {
-        schemes: schemes(names, Unit::Meter),
-        inlier_ratios: vec![0.5],
-        k: 20,
-        solvers: vec![Arc::new(Builtin::Joint)],
-        records_alone: false,
-        ..Plan::new(Unit::Meter)
-    }
 }
 
 fn audit(
@@ -171,39 +155,33 @@ fn a_unit_that_is_only_stated_is_no_protection() {
 
 #[test]
 fn a_gate_that_names_no_attack_needs_the_best_of_each_kind() {
-    let said = |gate: &str, plan: Plan<3>, described: bool| {
-        let values = (0..N * 8).map(|at| (at * 37 % 101) as u8).collect();
-        let descriptors = Descriptors::try_new(Values::U8(values), 8).expect("descriptors");
-        let descriptors = Some(descriptors).filter(|_| described);
-        let points = Prepared { descriptors, ..prepared(&room()) };
-        let input = Input::Map(Map { plan, ..Map::new(&points) });
-        let audited = audited(&points, &input, &[gate]).expect("an audit");
-        let gate = &audited.document.gates[0];
-        assert_eq!(gate.passed, gate.reason.is_none());
-        gate.reason.clone().unwrap_or_default()
-    };
+    let values = (0..N * 8).map(|at| (at * 37 % 101) as u8).collect();
+    let rows = Descriptors::try_new(Values::U8(values), 8).expect("descriptors");
     let alone = || plan(&["olc"]);
-    let by_geometry =
-        || Plan { neighbors: vec![NeighborsBy::Source(Arc::new(Geometric))], ..alone() };
-    for (gate, plan, described) in [
-        ("olc:0.25<=100", alone(), false),
-        ("olc@0.5:0.25<=100", alone(), false),
-        ("olc:geometric:0.25<=100", by_geometry(), false),
-    ] {
-        let said = said(gate, plan, described);
-        assert_eq!(said, "records alone were not tried, which this gate counts");
-    }
-    assert_eq!(said("olc:joint:0.25<=100", alone(), false), "");
+    let neighbors = vec![NeighborsBy::Source(Arc::new(Geometric))];
     let both = || Plan { records_alone: true, ..alone() };
-    let best = "neighbors by descriptors, the best source, were not tried, and no attack is named";
-    assert_eq!(said("olc:0.25<=100", both(), true), best);
-    assert_eq!(said("olc:0.25<=100", both(), false), "");
-    assert_eq!(said("olc@0.5:0.25<=100", both(), true), "");
     let weaker = || Plan { solvers: Builtin::list(&[Builtin::Consensus]), ..both() };
+    let records = "records alone were not tried, which this gate counts";
+    let best = "neighbors by descriptors, the best source, were not tried, and no attack is named";
     let joint = "joint, the strongest solver, was not tried, and none is named";
-    assert_eq!(said("olc:0.25<=100", weaker(), false), joint);
-    assert_eq!(said("olc:consensus:0.25<=100", weaker(), false), "");
-    assert_eq!(said("olc:0.25<=100", Plan { inlier_ratios: vec![1.0], ..both() }, true), "");
+    for (gate, plan, described, expected) in [
+        ("olc:0.25<=100", alone(), false, records),
+        ("olc@0.5:0.25<=100", alone(), false, records),
+        ("olc:geometric:0.25<=100", Plan { neighbors, ..alone() }, false, records),
+        ("olc:joint:0.25<=100", alone(), false, ""),
+        ("olc:0.25<=100", both(), true, best),
+        ("olc:0.25<=100", both(), false, ""),
+        ("olc@0.5:0.25<=100", both(), true, ""),
+        ("olc:0.25<=100", weaker(), false, joint),
+        ("olc:consensus:0.25<=100", weaker(), false, ""),
+        ("olc:0.25<=100", Plan { inlier_ratios: vec![1.0], ..both() }, true, ""),
+    ] {
+        let descriptors = described.then(|| rows.clone());
+        let points = Prepared { descriptors, ..prepared(&room()) };
+        let found = &audit(&points, None, plan, gate).expect("an audit").document.gates[0];
+        let reason = found.reason.as_deref().unwrap_or_default();
+        assert_eq!((found.passed, reason), (expected.is_empty(), expected), "{gate}");
+    }
 }
 
 #[test]

@@ -3,9 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use tempfile::TempDir;
 use unlift::Descriptors;
-use unlift::Unit;
-use unlift::audit::Plan;
 use unlift::descriptors::Values;
 use unlift::geometry::camera::{Camera, Intrinsics, Pose};
 use unlift::localization::Localization;
@@ -16,7 +15,7 @@ use unlift_audit::localization::{self, Localize};
 use unlift_audit::{Audited, Input, Map, Preparation, Prepared, Quiet, maps};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
-use crate::{audited, schemes};
+use crate::{audited, plan};
 
 const N_IMAGES: u32 = 12;
 const DIM: usize = 32;
@@ -30,7 +29,9 @@ fn camera(image: u32) -> Camera {
 }
 
 /// Writes a COLMAP model of random points, and features of its images with noise of half a pixel and similar descriptors.
-fn write(folder: &Path) {
+fn model() -> TempDir {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
     let mut draws = Draws::new(4, Stage::Shapes, 0);
     let mut point = |_| [draws.between(0.0, 5.0), draws.between(3.0, 5.0), draws.between(0.0, 2.5)];
     let points: Vec<[f64; 3]> = (0..1_500).map(&mut point).collect();
@@ -67,6 +68,7 @@ fn write(folder: &Path) {
     std::fs::write(folder.join("cameras.txt"), "1 PINHOLE 640 480 500 500 320 240\n").unwrap();
     std::fs::write(folder.join("images.txt"), images).unwrap();
     std::fs::write(folder.join("points3D.txt"), points).unwrap();
+    temporary
 }
 
 fn open(folder: &Path) -> Prepared {
@@ -76,21 +78,14 @@ fn open(folder: &Path) -> Prepared {
 
 fn audit(folder: &Path, mitigate: &[&str], gates: &[&str], held_out: bool) -> Audited {
     let prepared = open(folder);
-    let mut schemes = schemes(&["olc", "plane"], Unit::Meter);
+    let mut plan = plan(&["olc", "plane"]);
     let change = |text: &&str| {
         let tracks = Some(Arc::clone(&prepared.cameras.tracks));
         Change::Mitigation(Mitigation::parse(text).unwrap(), tracks)
     };
     let changes: Vec<Change> = mitigate.iter().map(change).collect();
-    schemes.extend(Changed::all(&schemes[..1], &changes));
-    let plan = Plan {
-        schemes,
-        k: 20,
-        inlier_ratios: vec![0.5],
-        solvers: vec![Arc::new(Builtin::Consensus)],
-        records_alone: false,
-        ..Plan::new(Unit::Meter)
-    };
+    plan.schemes.extend(Changed::all(&plan.schemes[..1], &changes));
+    plan.solvers = vec![Arc::new(Builtin::Consensus)];
     let held_out = held_out.then(|| (folder.join("features.h5"), 4));
     let localize = Localize { held_out, protections: Vec::new() };
     let map = Map { plan, localize: Some(localize), ..Map::new(&prepared) };
@@ -103,8 +98,7 @@ fn of<'a>(audited: &'a Audited, scheme: &str) -> &'a Localization {
 
 #[test]
 fn an_audit_of_a_model_with_tracks_says_what_protection_costs() {
-    let folder = tempfile::tempdir().unwrap();
-    write(folder.path());
+    let folder = model();
     let gates = ["olc:localization<=2.0", "olc:localization<=1.1", "plane:localization<=5"];
     let audited = audit(folder.path(), &["thin:1/4", "bits:2"], &gates, false);
     audited.document.check().unwrap();
@@ -133,8 +127,7 @@ fn an_audit_of_a_model_with_tracks_says_what_protection_costs() {
 
 #[test]
 fn held_out_images_are_localized() {
-    let folder = tempfile::tempdir().unwrap();
-    write(folder.path());
+    let folder = model();
     let audited = audit(folder.path(), &["bits:1"], &["all:localization<=4"], true);
     audited.document.check().unwrap();
     let held_out = |scheme: &str| of(&audited, scheme).held_out.as_ref().unwrap();
@@ -156,8 +149,7 @@ fn held_out_images_are_localized() {
 
 #[test]
 fn photos_of_another_size_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    write(folder.path());
+    let folder = model();
     let camera = "1 PINHOLE 1280 960 1000 1000 640 480\n";
     std::fs::write(folder.path().join("cameras.txt"), camera).unwrap();
     let Prepared { cameras, original, .. } = open(folder.path());
@@ -170,8 +162,7 @@ fn photos_of_another_size_are_refused() {
 
 #[test]
 fn a_model_without_tracks_is_silent_and_a_gate_on_it_is_told() {
-    let folder = tempfile::tempdir().unwrap();
-    write(folder.path());
+    let folder = model();
     std::fs::remove_file(folder.path().join("images.txt")).unwrap();
     let prepared = open(folder.path());
     assert!(prepared.cameras.views.is_empty());

@@ -4,22 +4,17 @@ use std::sync::Arc;
 
 use unlift::audit::{NeighborsBy, Plan};
 use unlift::neighbors::Geometric;
-use unlift::recover::Builtin;
-use unlift::{Unit, synthetic};
-use unlift_audit::{Input, Map, Preparation, Tiles, prepare};
+use unlift::synthetic;
+use unlift_audit::{Input, Map, Tiles};
 
-use crate::{audited, schemes};
+use crate::{audited, plan, prepared};
 
 fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
-    let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
-    let prepared = prepare(synthetic::room(4, 2_000).points, None, &preparation).unwrap();
+    let prepared = prepared(&synthetic::room(4, 2_000).points);
     let plan = Plan {
-        schemes: schemes(&["ppl", "plane"], Unit::Meter),
         neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Geometric))],
-        inlier_ratios: vec![0.5],
-        solvers: Builtin::list(&[Builtin::Joint]),
-        k: 20,
-        ..Plan::new(Unit::Meter)
+        records_alone: true,
+        ..plan(&["ppl", "plane"])
     };
     let map = Map { plan, ..Map::new(&prepared) };
     let input = Input::Tiles(map, Tiles { max_points: 600, only });

@@ -229,7 +229,7 @@ pub struct AuditMapArgs {
     #[arg(long, conflicts_with = "quick", help_heading = "Attack")]
     pub full: bool,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: all]
-    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::scheme, help_heading = "Attack")]
+    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::scheme::<3>, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     #[command(flatten)]
     pub solvers: SolverArgs,
@@ -281,7 +281,7 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "K", default_value = "20", help_heading = "Input", value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: lines2d,cp2d,dcl2d]
-    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme, help_heading = "Attack")]
+    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::scheme::<2>, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     /// Source of the attacker's lists of neighbors; repeatable: oracle, descriptors, similarity,
     /// overlap or learned (see unlift audit map) [default: descriptors, if there are any, and oracle]
@@ -313,7 +313,7 @@ pub struct AuditSequenceArgs {
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale, help_heading = "Input")]
     pub scale: Option<f64>,
     /// Schemes to audit, separated by commas (unlift schemes lists them) [default: lines2d,cp2d,dcl2d]
-    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme, help_heading = "Attack")]
+    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::scheme::<2>, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     /// Numbers of queries that the attacker watches, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::queries,
@@ -385,7 +385,7 @@ pub struct AuditReleasedArgs {
     #[arg(long, value_name = "K", default_value = "50", help_heading = "Input", value_parser = value_parser!(u16).range(1..))]
     pub k: u16,
     /// Also audit these schemes of unlift on the same points, separated by commas
-    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::scheme, help_heading = "Attack")]
+    #[arg(long, alias = "scheme", value_name = "LIST", value_delimiter = ',', value_parser = values::scheme::<3>, help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     #[command(flatten)]
     pub solvers: SolverArgs,

@@ -124,15 +124,14 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
         let inversion = match &args.paint.invert {
             Some(network) => {
                 let (photos, max_images) = (args.paint.photos.as_deref(), args.max_images.get());
-                let network = network.as_deref();
-                let opened = MapInversion::open(&prepared, photos, network, max_images, &progress)?;
-                Some(Arc::new(if has_ratios { opened } else { opened.at_ratio(PAINTED_RATIO) }))
+                let (network, ratio) = (network.as_deref(), (!has_ratios).then_some(PAINTED_RATIO));
+                let opened =
+                    MapInversion::open(&prepared, photos, network, max_images, ratio, &progress)?;
+                Some(Arc::new(opened))
             }
             None => None,
         };
-        if let Some(range) = args.expect_extent {
-            prepared.check_extent(range, args.map.scale)?;
-        }
+        prepared.check_extent(args.expect_extent, args.map.scale)?;
         let protections =
             protections_of_map(&args.protect.protect_descriptors, &prepared, |kind| {
                 public(args.protect.public_descriptors.as_deref(), kind)
@@ -203,9 +202,7 @@ pub fn released(args: &AuditReleasedArgs) -> crate::Result<bool> {
         let release = files.open()?;
         let about = files.about(&release)?;
         let released::Release { mut prepared, hidden, .. } = release;
-        if let Some(range) = args.expect_extent {
-            prepared.check_extent(range, None)?;
-        }
+        prepared.check_extent(args.expect_extent, None)?;
         let progress = Progress::new(args.audit.quiet);
         let (unit, n_points) = (prepared.original.reveal().unit(), prepared.original.len());
         let usual = Plan::new(unit).for_map(n_points, usize::from(args.k));
@@ -291,15 +288,13 @@ pub fn sequence(args: &AuditSequenceArgs) -> crate::Result<bool> {
     // Poses and links are not exact to a pixel.
     let thresholds = usual.thresholds[1..].to_vec();
     let plan = request.plan(Plan { thresholds, ..usual }, false)?;
-    let pose_error = match (args.poses, args.scale) {
-        (Some((cm, rotation_degrees)), Some(scale)) => {
-            Some(PoseError { center: 0.01 * cm / scale, rotation_degrees })
-        }
-        (Some(_), None) => {
-            bail!("--poses perturbed: expected --scale, meters per unit of the model")
-        }
-        (None, _) => None,
-    };
+    if args.poses.is_some() && args.scale.is_none() {
+        bail!("--poses perturbed: expected --scale, meters per unit of the model");
+    }
+    let pose_error = args.poses.zip(args.scale).map(|((cm, rotation_degrees), scale)| PoseError {
+        center: 0.01 * cm / scale,
+        rotation_degrees,
+    });
     if args.paint.invert.is_some() && args.audit.share_safe {
         bail!("--invert: expected without --share-safe, as pictures show the place");
     }

@@ -1,6 +1,6 @@
 //! Functions that several commands share.
 
-use std::io::Read;
+use std::io;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -51,9 +51,8 @@ pub fn public(path: Option<&Path>, kind: DescriptorKind) -> crate::Result<Descri
 
 /// Reads an `audit.json` of this version of the format.
 pub fn read_document(path: &Path) -> crate::Result<Document> {
-    let mut text = String::new();
-    let (mut file, _) = unlift_io::input::open(path)?;
-    file.read_to_string(&mut text).map_err(|error| Error::read(path, error))?;
+    let (file, _) = unlift_io::input::open(path)?;
+    let text = io::read_to_string(file).map_err(|error| Error::read(path, error))?;
     Document::from_json(&text).map_err(|error| {
         let text = error.to_string();
         // The path names the file already.

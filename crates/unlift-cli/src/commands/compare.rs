@@ -1,7 +1,7 @@
 //! `unlift compare`: compares two audits.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::Path;
 
 use unlift::OneLine;
 use unlift_audit::refused;
@@ -26,7 +26,7 @@ pub fn run(args: &CompareArgs) -> crate::Result<bool> {
         Some(out) => {
             let rules = Rules::new([args.old.as_path(), args.new.as_path()], false);
             let files = OutputSet::create(out, rules, access, &[(PAGE, Kind::Page)]);
-            Some((out, files.map_err(refused)?))
+            Some(files.map_err(refused)?)
         }
         None => None,
     };
@@ -34,22 +34,20 @@ pub fn run(args: &CompareArgs) -> crate::Result<bool> {
         let expected = format!("{}, as in {}", wrong.expected, args.old.display());
         Error::new(&args.new, wrong.place, expected, wrong.found)
     })?;
-    let mut written = None;
-    if let Some((out, mut files)) = out {
+    if let Some(mut files) = out {
         let text = page(&comparison, &old, &new)?;
         let staged = files.stage(PAGE, Kind::Page)?;
         write_file(&staged, access, |w| w.write_all(text.as_bytes()))?;
         files.commit()?;
-        written = Some(out.join(PAGE));
     }
     print(&match args.json {
         true => serde_json::to_string_pretty(&comparison)? + "\n",
-        false => text(&comparison, written),
+        false => text(&comparison, args.out.as_deref()),
     })?;
     Ok(comparison.passed)
 }
 
-fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
+fn text(comparison: &Comparison, out: Option<&Path>) -> String {
     let accepted = match &comparison.accepted {
         None => "NOT COMPARED".to_owned(),
         Some(accepted) if accepted.past => {
@@ -94,8 +92,8 @@ fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
     if !comparison.different.is_empty() && comparison.accepted.is_none() {
         text.push_str("if the inputs differ on purpose: --accept 'REASON, until YYYY-MM-DD', or keep the new audit as the baseline\n");
     }
-    if let Some(page) = written {
-        text.push_str(&format!("\npage: {}\n", OneLine(page.display())));
+    if let Some(out) = out {
+        text.push_str(&format!("\npage: {}\n", OneLine(out.join(PAGE).display())));
     }
     text
 }

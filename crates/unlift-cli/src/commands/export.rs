@@ -1,7 +1,6 @@
 //! `unlift export`: writes stage files of maps in formats of other programs.
 
 use std::ffi::OsStr;
-use std::path::Path;
 
 use unlift::released::Obfuscation;
 use unlift::{OneLine, Unit};
@@ -32,7 +31,7 @@ pub fn run(args: &ExportArgs) -> crate::Result<()> {
     }
     let n = if is_cloud {
         check_file("--out", &args.out, Kind::Cloud, &rules)?;
-        let points: Vec<[f64; 3]> = scaled_points(args)?.into_iter().flatten().collect();
+        let points: Vec<[f64; 3]> = points(args)?.into_iter().flatten().collect();
         write_points(&args.out, &points)?;
         format!("{} points", points.len())
     } else if ending.is_some() && !args.out.is_dir() {
@@ -49,7 +48,7 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
     let names = ["cameras.txt", "images.txt", "points3D.txt"];
     let first = names.map(|name| (name, Kind::Model));
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &first).map_err(refused)?;
-    let points = scaled_points(args)?;
+    let points = points(args)?;
     let (cameras, images) = match &args.cameras {
         None => (Vec::new(), Vec::new()),
         Some(project) => match read::open(project)?.model {
@@ -70,19 +69,8 @@ fn model(args: &ExportArgs, rules: Rules) -> crate::Result<String> {
 }
 
 /// Reads the points of the file, in units of the map if `--scale` is given.
-fn scaled_points(args: &ExportArgs) -> crate::Result<Points> {
-    let (mut points, unit) = read(&args.path)?;
-    let Some(scale) = args.scale else { return Ok(points) };
-    if unit != Unit::Meter {
-        let (path, unit) = (args.path.display(), unit.name());
-        bail!("--scale: expected a file in meters (obfuscate --scale), found {path} in {unit}");
-    }
-    points.iter_mut().flatten().for_each(|point| *point = point.map(|x| x / scale));
-    Ok(points)
-}
-
-/// Reads the file at `path`, and returns its points and their unit.
-fn read(path: &Path) -> crate::Result<(Points, Unit)> {
+fn points(args: &ExportArgs) -> crate::Result<Points> {
+    let path = &args.path;
     let kind = kind(path)?;
     let wrong = |found: &str| {
         let expected = "a released file of points, a recovered or a truth file of a map";
@@ -91,7 +79,7 @@ fn read(path: &Path) -> crate::Result<(Points, Unit)> {
     if has_images(path)? {
         return wrong("one of images");
     }
-    match kind {
+    let (mut points, unit): (Points, Unit) = match kind {
         Stage::Released => {
             let released = read_released::<3>(path)?;
             let Obfuscation::AxisCandidates(candidates) = released.obfuscation() else {
@@ -99,18 +87,25 @@ fn read(path: &Path) -> crate::Result<(Points, Unit)> {
             };
             let origin = released.origin();
             let place = |p: &[f32; 3]| Some([0, 1, 2].map(|c| f64::from(p[c]) + origin[c]));
-            Ok((candidates.position().iter().map(place).collect(), released.unit()))
+            (candidates.position().iter().map(place).collect(), released.unit())
         }
         Stage::Recovered => {
             let recovered = read_recovered::<3>(path, None)?;
             let points = (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
-            Ok((points, recovered.unit()))
+            (points, recovered.unit())
         }
         Stage::Truth => {
             let (original, _) = read_truth::<3>(path)?;
             let points = original.reveal();
-            Ok((points.positions().iter().copied().map(Some).collect(), points.unit()))
+            (points.positions().iter().copied().map(Some).collect(), points.unit())
         }
-        Stage::Neighborhoods | Stage::PointNeighborhoods => wrong("neighborhoods"),
+        Stage::Neighborhoods | Stage::PointNeighborhoods => return wrong("neighborhoods"),
+    };
+    let Some(scale) = args.scale else { return Ok(points) };
+    if unit != Unit::Meter {
+        let (path, unit) = (path.display(), unit.name());
+        bail!("--scale: expected a file in meters (obfuscate --scale), found {path} in {unit}");
     }
+    points.iter_mut().flatten().for_each(|point| *point = point.map(|x| x / scale));
+    Ok(points)
 }

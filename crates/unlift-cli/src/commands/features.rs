@@ -1,6 +1,8 @@
 //! `unlift features`: writes the keypoints and descriptors of images to one file.
 
 use unlift::OneLine;
+use unlift_audit::images::{FeatureSource, Wanted};
+use unlift_audit::{Progress as _, bail, check_file};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 use unlift_io::outputs::{Kind, Rules};
 use unlift_vision::features::in_order;
@@ -10,8 +12,6 @@ use super::common::all_could_be;
 use crate::args::FeaturesArgs;
 use crate::output::print;
 use crate::progress::Progress;
-use unlift_audit::images::{FeatureSource, Wanted};
-use unlift_audit::{Progress as _, bail, check_file};
 
 pub fn run(args: &FeaturesArgs) -> crate::Result<()> {
     let rules = Rules::new([args.images.as_path()], false);
@@ -24,9 +24,7 @@ pub fn run(args: &FeaturesArgs) -> crate::Result<()> {
     let turn = if args.as_stored { Turn::AsStored } else { Turn::Upright };
     let source = FeatureSource::open(&args.images, &extraction)?.with_turn(turn);
     let progress = Progress::new(args.quiet);
-    if let Some(note) = &source.passed_over {
-        progress.say(&format!("note: {note}"));
-    }
+    source.passed_over.iter().for_each(|note| progress.note(note));
     source.refused.iter().for_each(|line| progress.say(line));
     let (mut n_images, mut n_features, mut n_failed) = (0, 0, source.refused.len());
     let names = &source.names;

@@ -10,7 +10,8 @@ use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift_audit::images::{FeatureSource, Wanted, evenly, kind_of};
 use unlift_audit::inversion::view;
-use unlift_audit::refused;
+use unlift_audit::released::same_map;
+use unlift_audit::{bail, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, make_folders, write_file};
 use unlift_io::outputs::{Kind, OutputSet, Rules, marked_picture};
@@ -26,9 +27,7 @@ use super::common::all_could_be;
 use super::stages::{self, of_image};
 use crate::Error;
 use crate::args::InvertArgs;
-use crate::output::print;
-use crate::stderr;
-use unlift_audit::released::same_map;
+use crate::output::{print, tell};
 
 pub fn run(args: &InvertArgs) -> crate::Result<()> {
     let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
@@ -43,17 +42,13 @@ pub fn run(args: &InvertArgs) -> crate::Result<()> {
             let map = if has_images(&args.path)? { None } else { Some(read_released(&args.path)?) };
             match map.filter(|released| released.obfuscation().is_bearings()) {
                 Some(released) => bearings(&to, &released)?,
-                None => {
-                    return Err(Error::request(
-                        "RECOVERED: expected what came back of PATH, found none",
-                    ));
-                }
+                None => bail!("RECOVERED: expected what came back of PATH, found none"),
             }
         }
         (None, _) => keypoints(&to)?,
     };
     let failed: Vec<&Error> = results.iter().filter_map(|result| result.as_ref().err()).collect();
-    failed.iter().for_each(|error| stderr::tell(format_args!("unlift: {error}")));
+    failed.iter().for_each(|error| tell(format_args!("unlift: {error}")));
     let painted = results.len() - failed.len();
     print(&format!("{painted} pictures, in {}\n", OneLine(args.out.display())))?;
     all_could_be("painted", &args.path, painted, failed.len())
@@ -77,9 +72,7 @@ impl Target<'_> {
             return Err(FileError::new(&self.args.path, "image", expected, found).into());
         }
         // Append to the whole name, because `a.jpg` and `a.png` may be two images.
-        let mut file = self.args.out.join(relative).into_os_string();
-        file.push(".png");
-        let file = PathBuf::from(file);
+        let file = self.args.out.join(relative).with_added_extension("png");
         if let Some(folder) = file.parent() {
             make_folders(folder, Access::Private)?;
         }
@@ -108,8 +101,7 @@ fn each<T: Sync>(
 fn keypoints(to: &Target<'_>) -> crate::Result<Painted> {
     let path = &to.args.path;
     let wanted = Wanted { option: "--features", kind: to.args.features, ..Wanted::default() };
-    let extraction = wanted.extraction(path)?;
-    let source = FeatureSource::open(path, &extraction)?;
+    let source = FeatureSource::open(path, &wanted.extraction(path)?)?;
     let chosen = to.chosen(source.names.len());
     // Errors of single images are reported when they are painted.
     let kind = source.kind("PATH", &chosen)?;
@@ -180,9 +172,7 @@ fn images(to: &Target<'_>, recovered: &Path) -> crate::Result<Painted> {
 fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Painted> {
     let (args, path) = (to.args, &to.args.path);
     let Some(model) = &args.cameras else {
-        return Err(Error::request(
-            "--cameras: expected a COLMAP model whose cameras see the map, found none",
-        ));
+        bail!("--cameras: expected a COLMAP model whose cameras see the map, found none");
     };
     let scale = args.scale.unwrap_or(1.0);
     let released = read_released::<3>(path)?;
@@ -196,13 +186,13 @@ fn map(to: &Target<'_>, recovered: &Path) -> crate::Result<Painted> {
         let image = &images[at];
         let name = String::from_utf8_lossy(&image.name).into_owned();
         let camera = image.camera(&cameras).expect("checked when the model is read");
-        let view = view(camera, image, scale).map_err(of_image(model, &name))?;
-        if !painter.sees(&view, &came_back).map_err(of_image(model, &name))? {
+        let of_image = of_image(model, &name);
+        let view = view(camera, image, scale).map_err(&of_image)?;
+        if !painter.sees(&view, &came_back).map_err(&of_image)? {
             let error = unlift::Error::new("recovered points", "some before the camera", "none");
-            return Err(of_image(model, &name)(error).into());
+            return Err(of_image(error).into());
         }
-        let picture = painter.map(&view, &released, &came_back);
-        let picture = picture.map_err(of_image(model, &name))?;
+        let picture = painter.map(&view, &released, &came_back).map_err(of_image)?;
         Ok((name, picture))
     }))
 }

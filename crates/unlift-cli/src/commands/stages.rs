@@ -12,7 +12,7 @@ use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::blind;
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, of_what_there_is};
-use unlift::obfuscate::{Change, Changed, Scheme, SchemeOptions, obfuscate as hide};
+use unlift::obfuscate::{Change, Changed, SchemeOptions, obfuscate as hide};
 use unlift::recover::{RecoverOptions, Recovered, Status, recover as solve};
 use unlift::released::Released;
 use unlift::seed::Key;
@@ -21,8 +21,8 @@ use unlift::{About, OneLine, RowOrder, Unit};
 use unlift_audit::changes::{mitigations, protections_of_map};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Tally, stream};
-use unlift_audit::released::{check_name, expect_slots, same_map};
-use unlift_audit::{Prepared, Progress as _, bail, check_file, refused};
+use unlift_audit::released::{check_name, expect_truth, same_map};
+use unlift_audit::{Progress as _, bail, check_file, refused};
 use unlift_io::Error as FileError;
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::outputs::{Kind, OutputSet, Rules};
@@ -37,9 +37,8 @@ use unlift_vision::features::Extraction;
 use super::common::{all_could_be, open_map, public, read_document};
 use crate::Error;
 use crate::args::{EvaluateArgs, NeighborsArgs, ObfuscateArgs, RecoverArgs, public_name};
-use crate::output::{print, table};
+use crate::output::{self, print, table, tell};
 use crate::progress::{Progress, Stderr};
-use crate::stderr;
 use crate::values::NeighborSource;
 
 const RELEASED: &str = "released.npz";
@@ -98,8 +97,15 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
         return obfuscate_images(args, out);
     };
     let prepared = open_map(&args.path, map, false, (args.seed.unwrap_or(0), false))?;
-    prepared.remarks.doubts.iter().chain(&prepared.remarks.notes).for_each(stderr::note);
-    let scheme = changed(args, scheme, &prepared)?;
+    prepared.remarks.doubts.iter().chain(&prepared.remarks.notes).for_each(output::note);
+    let public = |kind| public(args.public_descriptors.as_deref(), kind);
+    let protections = protections_of_map(args.protect_descriptors.as_slice(), &prepared, public)?;
+    let mut changes = mitigations(args.mitigate.as_slice(), &prepared, false)?;
+    changes.extend(protections.into_iter().map(Change::Protection));
+    let scheme = match changes.pop() {
+        Some(change) => Arc::new(Changed::new(scheme, change)),
+        None => scheme,
+    };
     let name = scheme.name();
     let leak = match &args.audit {
         Some(path) => {
@@ -112,10 +118,10 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     };
     if let (None, Some(file)) = (&prepared.descriptors, prepared.input.beside.first()) {
         let file = file.display();
-        stderr::note(format!("no descriptors are released (--descriptors {file})"));
+        output::note(format!("no descriptors are released (--descriptors {file})"));
     }
     if replaces {
-        stderr::note(
+        output::note(
             "--out: an earlier release is replaced: never publish both, as their records meet in the points",
         );
     }
@@ -136,24 +142,8 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
 /// Returns the key from which all randomness comes.
 fn key(args: &ObfuscateArgs) -> Result<Key, unlift::Error> {
     let Some(seed) = args.seed else { return Key::fresh() };
-    stderr::tell(GUESSABLE);
+    tell(GUESSABLE);
     Ok(Key::from_seed(seed))
-}
-
-/// Returns `scheme` with the requested mitigation or protection of descriptors.
-fn changed(
-    args: &ObfuscateArgs,
-    scheme: Arc<dyn Scheme<3>>,
-    prepared: &Prepared,
-) -> crate::Result<Arc<dyn Scheme<3>>> {
-    let public = |kind| public(args.public_descriptors.as_deref(), kind);
-    let protections = protections_of_map(args.protect_descriptors.as_slice(), prepared, public)?;
-    let mut changes = mitigations(args.mitigate.as_slice(), prepared, false)?;
-    changes.extend(protections.into_iter().map(Change::Protection));
-    Ok(match changes.pop() {
-        Some(change) => Arc::new(Changed::new(scheme, change)),
-        None => scheme,
-    })
 }
 
 /// Hides the keypoints of all images, each under a key of its own, and writes both files into `out`.
@@ -306,9 +296,7 @@ fn map_by_source(args: &NeighborsArgs, named: &Named, rules: &Rules) -> crate::R
             ),
         }
     })?;
-    if let Some(note) = source.note(released.n_slots()) {
-        stderr::note(note);
-    }
+    source.note(released.n_slots()).iter().for_each(output::note);
     let lists = source.lists(&released, source.k(&released), args.seed).map_err(of_map)?;
     write_lists(args, rules, &lists)
 }
@@ -321,8 +309,7 @@ fn map_by_oracle(
 ) -> crate::Result<Counts> {
     let (original, secret) = read_truth::<3>(truth)?;
     let released = read_released::<3>(&args.released)?;
-    same_map(&args.released, Some(released.fingerprint()), truth, secret.map())?;
-    expect_slots(&args.released, &released, &secret)?;
+    expect_truth(&args.released, &released, truth, &secret)?;
     let how = (args.oracle_noise, ratio, usize::from(args.k.unwrap_or(K)));
     let lists = oracle_lists(&original, &(released, secret), how, args.seed);
     write_lists(args, rules, &lists.map_err(|error| FileError::core(truth, error))?)
@@ -352,8 +339,7 @@ fn images_by_oracle(
 ) -> crate::Result<Counts> {
     let next = pairs(truth, Some(&args.released))?;
     let how = (args.oracle_noise, ratio, usize::from(args.k.unwrap_or(K)));
-    let work = |pair: Pair| {
-        let Pair { name, original, secret, released } = pair;
+    let work = |Pair { name, original, secret, released }: Pair| {
         let Some(released) = released else { return Ok(None) };
         let seed = oracle_seed(args.seed, &name);
         let lists = oracle_lists(&original, &(released, secret), how, seed);
@@ -471,15 +457,14 @@ struct Evaluated {
     /// Without a fingerprint if any image lacks that of its released image.
     about: About,
     slots_per_record: usize,
-    /// Doubts about the figures, or why the compared files do not belong together.
-    doubts: Result<Vec<String>, unlift::Error>,
+    checked: Checked,
 }
 
 pub fn evaluate(args: &EvaluateArgs) -> crate::Result<()> {
     // The released map beside the truth, for the blind baseline.
     let released = Some(args.truth.with_file_name(RELEASED)).filter(|path| path.exists());
     let released = released.as_deref();
-    let Evaluated { row, about, slots_per_record, doubts } = match has_images(&args.truth)? {
+    let Evaluated { row, about, slots_per_record, checked } = match has_images(&args.truth)? {
         true => evaluate_images(args, released)?,
         false => evaluate_map(args, released)?,
     };
@@ -492,7 +477,7 @@ pub fn evaluate(args: &EvaluateArgs) -> crate::Result<()> {
                     record, so the figures are upper bounds";
         notes.push(note.to_owned());
     }
-    notes.extend(doubts.map_err(|error| {
+    notes.extend(checked.notes(&thresholds(args, row.unit), row.unit).map_err(|error| {
         let error = Error::from(FileError::core(&args.recovered, error));
         if released.is_some() {
             return error;
@@ -501,8 +486,9 @@ pub fn evaluate(args: &EvaluateArgs) -> crate::Result<()> {
             "put {RELEASED} beside the truth: records identify a map better than points"
         ))
     })?);
+    notes.extend(exchanged(&row));
     for note in &notes {
-        stderr::note(format_args!("{}: {note}", args.recovered.display()));
+        output::note(format_args!("{}: {note}", args.recovered.display()));
     }
     print(&match args.json {
         true => format!("{:#}\n", unlift_audit::evaluated(&row, &notes)?),
@@ -527,8 +513,7 @@ fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<E
     same_map(&args.recovered, about.map, &args.truth, secret.map())?;
     let released = released.map(|path| {
         let released = read_released::<3>(path)?;
-        same_map(path, Some(released.fingerprint()), &args.truth, secret.map())?;
-        expect_slots(path, &released, &secret)?;
+        expect_truth(path, &released, &args.truth, &secret)?;
         Ok::<_, FileError>(released)
     });
     let released = released.transpose()?;
@@ -538,11 +523,7 @@ fn evaluate_map(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<E
     let baseline = released.map(|released| blind(&released, &original, &secret));
     let (row, _) = measure(&recovered, &original, &secret, baseline.as_ref(), &thresholds)
         .map_err(|error| FileError::core(&args.recovered, error))?;
-    let slots_per_record = secret.slots_per_record();
-    let doubts = checked
-        .notes(&thresholds, unit)
-        .map(|notes| notes.into_iter().chain(exchanged(&row)).collect());
-    Ok(Evaluated { row, about, slots_per_record, doubts })
+    Ok(Evaluated { row, about, slots_per_record: secret.slots_per_record(), checked })
 }
 
 fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Result<Evaluated> {
@@ -570,8 +551,7 @@ fn evaluate_images(args: &EvaluateArgs, released: Option<&Path>) -> crate::Resul
     file.expect_end(&args.truth)?;
     let none = || FileError::new(&args.truth, "", "images with hidden points", "none");
     let row = pooled.row().ok_or_else(none)?;
-    let (about, doubts) = (about.unwrap_or_default(), checked.notes(&thresholds, Unit::Pixel));
-    Ok(Evaluated { row, about, slots_per_record: 1, doubts })
+    Ok(Evaluated { row, about: about.unwrap_or_default(), slots_per_record: 1, checked })
 }
 
 /// An image with its truth.
@@ -603,8 +583,7 @@ fn pairs<'a>(
         let released = match &mut released {
             Some((path, released)) if secret.n_slots() > 0 => {
                 let image = released.expect(&name, truth)?.released()?;
-                same_map(path, Some(image.fingerprint()), truth, secret.map())?;
-                expect_slots(path, &image, &secret)?;
+                expect_truth(path, &image, truth, &secret)?;
                 Some(image)
             }
             _ => None,

@@ -1,6 +1,7 @@
 //! `unlift table`: prints the results of an audit as a table.
 
 use std::io::Write;
+use std::path::Path;
 
 use unlift_audit::{bail, check_file};
 use unlift_io::atomic::{Access, write_file};
@@ -10,21 +11,18 @@ use unlift_report::export::{csv, latex, thresholds};
 
 use super::common::read_document;
 use crate::args::TableArgs;
-use crate::output::print;
-use crate::stderr;
+use crate::output::{note, print};
 
 pub fn run(args: &TableArgs) -> crate::Result<()> {
-    let ending = args.out.as_ref().map(|out| {
-        let ending = out.extension().unwrap_or_default();
-        ending.to_string_lossy().to_ascii_lowercase()
-    });
-    let table: fn(&Document, &[&str]) -> String = match ending.as_deref() {
-        None | Some("csv") => csv,
-        Some("tex") => latex,
-        Some(_) => {
-            let found = args.out.iter().map(|out| out.display().to_string()).collect::<String>();
-            bail!("--out: expected a name that ends in .csv or .tex, found {found}")
+    let ends_in = |out: &Path, ending: &str| {
+        out.extension().is_some_and(|of| of.eq_ignore_ascii_case(ending))
+    };
+    let table: fn(&Document, &[&str]) -> String = match &args.out {
+        Some(out) if ends_in(out, "tex") => latex,
+        Some(out) if !ends_in(out, "csv") => {
+            bail!("--out: expected a name that ends in .csv or .tex, found {}", out.display())
         }
+        _ => csv,
     };
     let rules = Rules::new([args.audit.as_path()], false);
     if let Some(path) = &args.out {
@@ -40,14 +38,11 @@ pub fn run(args: &TableArgs) -> crate::Result<()> {
         let (known, found) = (known.join(", "), &requested.label);
         bail!("--thresholds: expected one of {known}, as in the audit, found {found}");
     }
-    let text = match only {
-        Some(typed) => table(&document, &[typed]),
-        None => table(&document, &known),
-    };
+    let text = table(&document, if only.is_some() { only.as_slice() } else { &known });
     // A table does not show schemes that were not audited.
     for missing in &document.not_audited {
         let by = missing.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
-        stderr::note(format_args!("not audited: {}{by}: {}", missing.scheme, missing.reason));
+        note(format_args!("not audited: {}{by}: {}", missing.scheme, missing.reason));
     }
     match &args.out {
         // All users may read it.

@@ -1,11 +1,9 @@
 //! `unlift audit again`: two maps in, rows by links out.
 
-use crate::common::{Place, recovered, row, rows};
+use crate::common::{Place, random, recovered, row, rows};
 
 /// Creates a map in `a.csv`, a version without its last tenth in `b.csv`, and descriptors of both. Returns the points of the first.
 fn maps() -> (Place, Vec<[f64; 3]>) {
-    // Numbers in [0, 1) for any index.
-    let random = |at: usize| (at as f64 * 0.754_877_666 + 0.1).fract();
     let unit = |at: usize| [0, 1, 2].map(|c| random(3 * at * at % 7907 + c * 131 + at));
     let points: Vec<[f64; 3]> =
         (0..300).map(unit).map(|[x, y, z]| [5.0 * x, 4.0 * y, 3.0 * z]).collect();

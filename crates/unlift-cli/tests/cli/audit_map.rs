@@ -26,6 +26,12 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
         ("room.csv --scale -1", 2, number),
         ("room.csv --thresholds -1", 2, "expected a number above 0, found -1"),
         ("room.csv --inlier-ratios -1", 2, "expected a number from 0 to 1, found -1"),
+        ("room.csv --inlier-ratios nan", 2, "expected a number from 0 to 1, found nan"),
+        ("room.csv --max-points 4294967296", 2, "expected a whole number from 1 to 4294967295, found 4294967296"),
+        ("room.csv --schemes pppl", 2, "expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, sphere, found pppl"),
+        ("room.csv --schemes cp2d", 2, "plane, cp, sphere, found cp2d (for images only)"),
+        ("room.csv --solver magic", 2, "expected one of joint, consensus, ransac, density, tomography, found magic"),
+        ("room.csv --oracle-noise white", 2, "expected one of uniform, near, clustered, found white"),
         ("room.csv --scale 1e-300", 2, "units across, found 1e-300\n  try: --scale 1 for a map in meters"),
         ("room.csv --scale 1e-3", 2, "any guess would count as recovered\n  try: another --scale"),
         ("room.csv --scale 1e5", 2, "no attack could come near\n  try: another --scale"),
@@ -44,7 +50,8 @@ fn what_cannot_be_meant_is_refused_with_a_way_out() {
     place.ends("obfuscate room.csv --schemes olc --k 10 --out hidden", 0);
     let expected = "expected some, as neighbors by overlap need them, found none\n  \
                     try: --neighbors geometric, or hide the map with unlift obfuscate --descriptors FILE\n";
-    place.refuses("neighbors", &[("hidden/released.npz --neighbors overlap", 3, expected)]);
+    let sources = "expected one of similarity, overlap, geometric, learned, descriptors, found magic";
+    place.refuses("neighbors hidden/released.npz --neighbors", &[("overlap", 3, expected), ("magic", 2, sources)]);
 }
 
 #[test]

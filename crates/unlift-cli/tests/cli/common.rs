@@ -6,9 +6,13 @@ use std::process::{Command, Output, Stdio};
 
 use image::RgbImage;
 use serde_json::Value;
+use unlift::Descriptors;
 use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
 pub struct Place(tempfile::TempDir);
+
+/// Name, keypoints and descriptors of an image.
+pub type Image = (String, Vec<[f64; 2]>, Option<Descriptors>);
 
 impl Place {
     pub fn empty() -> Self {
@@ -61,10 +65,14 @@ impl Place {
         self.write(name, bytes);
     }
 
-    /// Writes features of images in hloc's format.
-    pub fn write_features(&self, name: &str, images: impl IntoIterator<Item = ImageFeatures>) {
-        let mut writer = FeatureWriter::create(&self.path(name)).unwrap();
-        images.into_iter().for_each(|image| writer.append(&image).unwrap());
+    /// Writes features of images of 640 x 480 pixels in hloc's format.
+    pub fn write_features(&self, file: &str, images: impl IntoIterator<Item = Image>) {
+        let mut writer = FeatureWriter::create(&self.path(file)).unwrap();
+        for (name, keypoints, descriptors) in images {
+            let size = Some([640, 480]);
+            let image = ImageFeatures { name, size, keypoints, descriptors, ..Default::default() };
+            writer.append(&image).unwrap();
+        }
         writer.finish().unwrap();
     }
 
@@ -167,6 +175,11 @@ pub fn recovered(row: &Value, threshold: &str) -> f64 {
 pub fn texts(output: &Output) -> (String, String) {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
     (text(&output.stdout), text(&output.stderr))
+}
+
+/// Returns a number in [0, 1) for any index.
+pub fn random(at: usize) -> f64 {
+    (at as f64 * 0.754_877_666 + 0.1).fract()
 }
 
 /// Draws blobs of several sizes at positions that depend on `which`.

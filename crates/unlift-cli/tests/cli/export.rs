@@ -1,12 +1,9 @@
 //! `unlift export`: exported files are read back and lie on the map.
 
+use unlift::geometry::vector::distance;
 use unlift_io::read;
 
 use crate::common::Place;
-
-fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
-}
 
 #[test]
 #[rustfmt::skip] // One row per line.

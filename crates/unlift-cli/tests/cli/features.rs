@@ -42,6 +42,7 @@ fn options_are_those_of_the_extractor() {
     assert_eq!(count("--features aliked --min-score 0.05 --max-features 5"), 3 * 5);
     place.refuses("features", &[
         ("photos --max-features 0", 2, "expected a whole number from 1 to 4294967295, found 0"),
+        ("photos --features aliked --min-score 1", 2, "expected a number from 0 to below 1, found 1"),
         ("photos --features orb", 2, "expected one of sift, aliked, superpoint, found orb"),
         ("photos --min-score 0.1", 2, "unlift: --min-score: expected with --features aliked, found none"),
         ("features.h5 --as-stored --out x.h5", 2, "--as-stored: expected with a folder of photos"),

@@ -5,7 +5,6 @@ use std::fs;
 use image::RgbImage;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_io::features::ImageFeatures;
 
 use crate::common::{Place, rows};
 
@@ -71,9 +70,7 @@ fn what_cannot_be_audited_is_one_line() {
     for (file, descriptors) in [("bare.h5", None), ("floats.h5", Some(floats))] {
         let place_of = |i: u32| [97 * i % 631, 61 * i % 467].map(f64::from);
         let keypoints = (0..90).map(place_of).collect();
-        let (name, size) = ("a.png".to_owned(), Some([640, 480]));
-        let image = ImageFeatures { name, size, keypoints, descriptors, ..Default::default() };
-        place.write_features(file, [image]);
+        place.write_features(file, [("a.png".to_owned(), keypoints, descriptors)]);
     }
     place.refuses("audit images", &[
         ("empty", 3, "unlift: empty: expected JPEG, PNG or WebP photos, found none\n"),

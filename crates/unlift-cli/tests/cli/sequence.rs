@@ -3,17 +3,11 @@
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 use unlift::geometry::camera::{Camera, Intrinsics, Pose};
-use unlift_io::features::ImageFeatures;
 
-use crate::common::{Place, recovered, row, rows};
+use crate::common::{Place, random, recovered, row, rows};
 
 const N_IMAGES: usize = 6;
 const N_POINTS: usize = 80;
-
-/// Returns a number in [0, 1) for any index.
-fn random(at: usize) -> f64 {
-    (at as f64 * 0.754_877_666 + 0.1).fract()
-}
 
 /// Creates the COLMAP model of a walk in `model`, and the features of its images, without noise, in `f.h5`.
 fn walk() -> Place {
@@ -36,13 +30,8 @@ fn walk() -> Place {
         images += &format!("{} {cos} 0 0 {sin} {x} {y} {z} 1 {at}.png\n\n", at + 1);
         let intrinsics = Intrinsics { focal: [500.0; 2], principal: [319.5, 239.5] };
         let camera = Camera { intrinsics, pose };
-        features.push(ImageFeatures {
-            name: format!("{at}.png"),
-            size: Some([640, 480]),
-            keypoints: points.iter().filter_map(|point| camera.project(point)).collect(),
-            descriptors: Some(descriptors.clone()),
-            ..ImageFeatures::default()
-        });
+        let keypoints = points.iter().filter_map(|point| camera.project(point)).collect();
+        features.push((format!("{at}.png"), keypoints, Some(descriptors.clone())));
     }
     place.write_features("f.h5", features);
     let track: String = (1..=N_IMAGES).map(|id| format!(" {id} 0")).collect();
@@ -99,8 +88,7 @@ fn lists_and_changed_descriptors_have_rows_of_their_own() {
     assert!(share("lines2d_noise0.5", "sequence@5") < alone - 20.0);
     let shuffled = place.features("f.h5").into_iter().enumerate().map(|(at, image)| {
         let order: Vec<u32> = (0..N_POINTS).map(|row| ((row + 17 * at) % N_POINTS) as u32).collect();
-        let descriptors = image.descriptors.map(|rows| rows.select(&order));
-        ImageFeatures { descriptors, ..image }
+        (image.name, image.keypoints, image.descriptors.map(|rows| rows.select(&order)))
     });
     place.write_features("g.h5", shuffled);
     place.refuses("audit sequence model", &[

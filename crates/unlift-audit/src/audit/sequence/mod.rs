@@ -80,18 +80,12 @@ impl Sequence<'_> {
             return Err(unlift_io::Error::new(self.model, "", expected, input.format).into());
         };
         let pose_error = self.pose_error.map(|error| (error, self.plan.seed));
-        let (mut views, mut unusable) = (Vec::new(), refused.len());
         refused.iter().for_each(|line| progress.say(line));
         let model = Model::read(folder)?;
-        for view in model.views((source, path), pose_error) {
-            match view {
-                Ok(view) => views.push(view),
-                Err(error) => {
-                    unusable += 1;
-                    progress.say(&error.to_string());
-                }
-            }
-        }
+        let views = model.views((source, path), pose_error);
+        let n_found = views.len() + refused.len();
+        let told = |view: Result<View, Error>| view.inspect_err(|e| progress.say(&e.to_string()));
+        let views: Vec<View> = views.into_iter().flat_map(told).collect();
         let fewest = self.queries.first().copied().unwrap_or(2);
         if views.len() < fewest {
             let expected = format!("at least {fewest} images that are in {}", self.model.display());
@@ -99,7 +93,7 @@ impl Sequence<'_> {
             return Err(unlift_io::Error::new(path, "", expected, found).into());
         }
         let wrong = |(expected, found)| unlift_io::Error::new(path, "", expected, found);
-        alike(&views, model.n_points()).map_err(wrong)?;
+        alike(&views, model.positions.len()).map_err(wrong)?;
         let mut notes = Vec::new();
         let n_left_out: usize = views.iter().map(|view| view.n_left_out).sum();
         if n_left_out > 0 {
@@ -124,7 +118,7 @@ impl Sequence<'_> {
         }
         let counts = ImageCounts {
             used: views.len() as u64,
-            unusable: unusable as u64,
+            unusable: (n_found - views.len()) as u64,
             ..ImageCounts::default()
         };
         let n_points = views.iter().map(|view| view.original.len()).sum();

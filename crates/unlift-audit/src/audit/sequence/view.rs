@@ -15,8 +15,7 @@ use unlift_io::features::ImageFeatures;
 use unlift_io::read::colmap::{self, Image};
 use unlift_vision::pictures::Lens;
 
-use crate::images::FeatureSource;
-use crate::images::other_size;
+use crate::images::{FeatureSource, other_size};
 
 /// A keypoint shows a point of the model if it is the nearest one to the point's projection and at most this far away, in pixels.
 const SHOWS_PX: f64 = 2.0;
@@ -52,7 +51,7 @@ impl View {
 pub struct Model {
     cameras: Vec<colmap::Camera>,
     images: Vec<Image>,
-    positions: Vec<[f64; 3]>,
+    pub positions: Vec<[f64; 3]>,
     shown: Vec<Vec<u32>>,
 }
 
@@ -67,10 +66,6 @@ impl Model {
         let observed = points.tracks.as_ref().map(|tracks| tracks.observed(&images, &rows).0);
         let shown = observed.unwrap_or_else(|| vec![Vec::new(); images.len()]);
         Ok(Self { cameras, images, positions: points.positions, shown })
-    }
-
-    pub fn n_points(&self) -> usize {
-        self.positions.len()
     }
 
     /// Returns the views of all images that are in the model and in `source`, in the order of [`in_time`], and an error for each that
@@ -171,19 +166,13 @@ impl Model {
 }
 
 fn bounds(lens: &Lens, size: [f64; 2]) -> Option<Bounds<2>> {
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for at in 0..=PER_SIDE {
-        let t = at as f64 / PER_SIDE as f64;
-        let [x, y] = size.map(|side| side * t - 0.5);
-        let [right, bottom] = size.map(|side| side - 0.5);
-        for place in [[x, -0.5], [x, bottom], [-0.5, y], [right, y]] {
-            let place = lens.undistorted(&lens.intrinsics(), place)?;
-            for c in 0..2 {
-                low[c] = low[c].min(place[c]);
-                high[c] = high[c].max(place[c]);
-            }
-        }
-    }
+    let (pinhole, [right, bottom]) = (lens.intrinsics(), size.map(|side| side - 0.5));
+    let on_border = (0..=PER_SIDE).flat_map(|at| {
+        let [x, y] = size.map(|side| side * (at as f64 / PER_SIDE as f64) - 0.5);
+        [[x, -0.5], [x, bottom], [-0.5, y], [right, y]]
+    });
+    let places = on_border.map(|place| lens.undistorted(&pinhole, place));
+    let Bounds { low, high } = Bounds::quantiles(&places.collect::<Option<Vec<_>>>()?, 0.0)?;
     Bounds::try_new(low, high).ok()
 }
 
@@ -204,17 +193,15 @@ fn in_time(images: &[(&str, u32, [f64; 3])]) -> Vec<usize> {
 ///
 /// A run of digits becomes its length without zeros in front, and itself. Names that differ in such zeros alone stay in their order.
 fn natural(name: &str) -> Vec<(usize, &[u8])> {
-    let mut parts = Vec::new();
-    for run in name.as_bytes().chunk_by(|a, b| a.is_ascii_digit() && b.is_ascii_digit()) {
+    let runs = name.as_bytes().chunk_by(|a, b| a.is_ascii_digit() && b.is_ascii_digit());
+    runs.map(|run| {
         let zeros = run.iter().take_while(|&&digit| digit == b'0').count();
-        let number = &run[zeros..];
-        parts.push(if run[0].is_ascii_digit() {
-            (number.len(), number)
-        } else {
-            (usize::MAX, run)
-        });
-    }
-    parts
+        match run[0].is_ascii_digit() {
+            true => (run.len() - zeros, &run[zeros..]),
+            false => (usize::MAX, run),
+        }
+    })
+    .collect()
 }
 
 #[cfg(test)]
