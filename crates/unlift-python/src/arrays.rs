@@ -7,7 +7,6 @@ use std::ops::RangeInclusive;
 use numpy::{Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use unlift::descriptors::Values;
 use unlift::{Descriptors, OneLine};
 
@@ -61,23 +60,20 @@ fn array<'py>(
     Ok(array)
 }
 
-/// Converts `array` to a contiguous array of `T`, without a copy if it is one already.
-fn contiguous<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
-    let py = array.py();
-    let options = PyDict::new(py);
-    options.set_item("dtype", T::get_dtype(py))?;
-    let made = py.import("numpy")?.call_method("ascontiguousarray", (array,), Some(&options))?;
-    made.cast_into().map_err(|error| raised(error.to_string()))
+/// Returns the values of `array`, converted to `T`, and its shape.
+fn values<T: Element + Clone>(array: &Bound<'_, PyAny>) -> PyResult<(Vec<T>, Vec<usize>)> {
+    let (py, dtype) = (array.py(), T::get_dtype(array.py()));
+    let made = py.import("numpy")?.call_method1("ascontiguousarray", (array, dtype))?;
+    let made = made.cast_into::<PyArrayDyn<T>>().map_err(raised)?;
+    Ok((made.readonly().as_slice()?.to_vec(), made.shape().to_vec()))
 }
 
 /// Returns the rows of an array `(n, D)`.
 pub fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; D]>> {
-    let array = contiguous::<f64>(&array(name, given, NUMBERS)?)?;
-    match array.shape() {
-        [_, columns] if *columns == D => {
-            Ok(array.readonly().as_slice()?.as_chunks::<D>().0.to_vec())
-        }
-        shape => Err(wrong(name, format!("an array of shape (n, {D})"), shape_text(shape))),
+    let (values, shape) = numbers(name, given)?;
+    match shape[..] {
+        [_, columns] if columns == D => Ok(values.as_chunks::<D>().0.to_vec()),
+        _ => Err(wrong(name, format!("an array of shape (n, {D})"), shape_text(&shape))),
     }
 }
 
@@ -89,8 +85,7 @@ pub fn is_of_pairs(name: &str, given: &Bound<'_, PyAny>) -> PyResult<bool> {
 
 /// Returns the values of an array, and its shape.
 pub fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
-    let array = contiguous::<f64>(&array(name, given, NUMBERS)?)?;
-    Ok((array.readonly().as_slice()?.to_vec(), array.shape().to_vec()))
+    values(&array(name, given, NUMBERS)?)
 }
 
 /// Returns the values of an array `(n,)`.
@@ -101,13 +96,13 @@ pub fn column(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     }
 }
 
-/// Returns whole numbers in `range`, from an array with one of `dims` axes, and its shape.
-pub fn whole(
+/// Returns whole numbers in `range`, which `T` can hold, from an array with one of `dims` axes, and its shape.
+pub fn whole<T: Element + Clone>(
     name: &str,
     given: &Bound<'_, PyAny>,
     dims: &[usize],
     range: RangeInclusive<i64>,
-) -> PyResult<(Vec<i64>, Vec<usize>)> {
+) -> PyResult<(Vec<T>, Vec<usize>)> {
     let array = array(name, given, WHOLE)?;
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     if !dims.contains(&shape.len()) {
@@ -115,7 +110,7 @@ pub fn whole(
         let expected = format!("an array of {} axes", axes.join(" or "));
         return Err(wrong(name, expected, shape_text(&shape)));
     }
-    // Large values of uint64 would wrap in int64.
+    // Values outside of `range` would wrap in `T`.
     let bounds: &[&str] = if shape.contains(&0) { &[] } else { &["min", "max"] };
     for bound in bounds {
         let value: i128 = array.call_method0(*bound)?.call_method0("item")?.extract()?;
@@ -124,18 +119,7 @@ pub fn whole(
             return Err(wrong(name, expected, value));
         }
     }
-    Ok((contiguous::<i64>(&array)?.readonly().as_slice()?.to_vec(), shape))
-}
-
-/// Returns whole numbers from 0 below `end`, from an array with one of `dims` axes, and its shape.
-pub fn indices(
-    name: &str,
-    given: &Bound<'_, PyAny>,
-    dims: &[usize],
-    end: u32,
-) -> PyResult<(Vec<u32>, Vec<usize>)> {
-    let (values, shape) = whole(name, given, dims, 0..=i64::from(end) - 1)?;
-    Ok((values.into_iter().map(|value| value as u32).collect(), shape))
+    Ok((values(&array)?.0, shape))
 }
 
 /// Returns descriptors `(n, dim)`: bytes, or floats.
@@ -143,11 +127,9 @@ pub fn descriptors(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Descriptors
     let array = array(name, given, DESCRIPTORS)?;
     let dtype: String = array.getattr("dtype")?.getattr("name")?.extract()?;
     let (values, shape) = if dtype == "uint8" {
-        let array = contiguous::<u8>(&array)?;
-        (Values::U8(array.readonly().as_slice()?.to_vec()), array.shape().to_vec())
+        values(&array).map(|(bytes, shape)| (Values::U8(bytes), shape))?
     } else if dtype.starts_with("float") {
-        let array = contiguous::<f32>(&array)?;
-        (Values::F32(array.readonly().as_slice()?.to_vec()), array.shape().to_vec())
+        values(&array).map(|(floats, shape)| (Values::F32(floats), shape))?
     } else {
         let (_, what) = DESCRIPTORS;
         return Err(wrong(name, format!("an array of {what}"), format!("one of {dtype}")));

@@ -95,7 +95,7 @@ fn observed(
             .is_some_and(|note| audited.document.notes.iter().any(|known| known == note))
     };
     let messages = watcher.messages().into_iter().filter(|line| !is_note(line)).collect();
-    Ok((Report::of(audited), messages))
+    Ok((Report(Arc::new(audited)), messages))
 }
 
 /// Renames options of the command line that begin an error to Python arguments.

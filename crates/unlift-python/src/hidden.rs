@@ -230,11 +230,8 @@ pub struct Hidden {
 #[pymethods]
 impl Hidden {
     fn __repr__(&self) -> String {
-        format!(
-            "<unlift.Hidden: {} points in {}>",
-            self.released.n_slots(),
-            self.released.__repr__()
-        )
+        let released = &self.released;
+        format!("<unlift.Hidden: {} points in {}>", released.n_slots(), released.__repr__())
     }
 }
 

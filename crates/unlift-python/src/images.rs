@@ -31,22 +31,21 @@ impl Images {
         if !is_mapping(given)? {
             return Err(wrong("images", "a path, or a dict of names to arrays", given.get_type()));
         }
-        let by_name = given.clone();
         let mut names = Vec::new();
-        for name in by_name.call_method0("keys")?.try_iter()? {
+        for name in given.call_method0("keys")?.try_iter()? {
             let name = name?;
-            let text = name.extract::<String>();
             let wrong = |_| wrong("images", "names that are texts", OneLine(&name));
-            names.push(text.map_err(wrong)?);
+            names.push(name.extract::<String>().map_err(wrong)?);
         }
         names.sort_unstable();
-        let (by, by_name, keys) = (by.clone(), Arc::new(by_name.unbind()), names.clone());
-        let get = move |at: usize| {
-            let (by_name, name, place) = (Arc::clone(&by_name), keys[at].clone(), place(&keys[at]));
-            let at = place.clone();
+        let (by, by_name, keys) = (by.clone(), Arc::new(given.clone().unbind()), names.clone());
+        let get = move |image: usize| {
+            let (by_name, name) = (Arc::clone(&by_name), keys[image].clone());
+            let place = at("images", &name);
+            let of = place.clone();
             let features = by.made(move |py| {
                 let given = by_name.bind(py).get_item(name);
-                match given.and_then(|given| features_of(&at, &given)) {
+                match given.and_then(|given| features_of(&of, &given)) {
                     // Our own exceptions name the image.
                     Err(error) if error.is_instance_of::<UnliftError>(py) => {
                         Ok(Err(error.value(py).to_string()))
@@ -60,11 +59,6 @@ impl Images {
         };
         FeatureSource::in_memory(names, get).map(Self::InMemory).map_err(raised)
     }
-}
-
-/// Returns the place of an image in errors, in Python notation.
-fn place(name: &str) -> String {
-    format!("images[{name:?}]")
 }
 
 fn is_mapping(given: &Bound<'_, PyAny>) -> PyResult<bool> {
@@ -107,6 +101,7 @@ fn features_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<ImageFeatures>
     Ok(ImageFeatures { size: Some(size), keypoints, descriptors, ..Default::default() })
 }
 
+/// Returns the place of an item in errors, in Python notation.
 fn at(place: &str, key: &str) -> String {
     format!("{place}[{key:?}]")
 }

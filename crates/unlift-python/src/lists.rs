@@ -110,7 +110,7 @@ fn lists_of<const D: usize>(
     needs: Needs,
 ) -> PyResult<neighbors::Neighborhoods> {
     let (n, n_slots) = (released.n_records(), released.n_slots());
-    let (rows, shape) = whole("records", records, &[2], -1..=n as i64 - 1)?;
+    let (rows, shape) = whole::<i64>("records", records, &[2], -1..=n as i64 - 1)?;
     if shape[0] != n_slots {
         let expected = format!("an array of shape ({n_slots}, k), one row per hidden point");
         return Err(wrong("records", expected, shape_text(&shape)));
@@ -121,7 +121,7 @@ fn lists_of<const D: usize>(
     };
     let scores = scores.map(|scores| numbers("scores", scores)).transpose()?;
     scores.iter().try_for_each(|(_, own)| check_shape("scores", own))?;
-    let slots = slots.map(|slots| whole("slots", slots, &[2], -1..=n_slots as i64 - 1));
+    let slots = slots.map(|slots| whole::<i64>("slots", slots, &[2], -1..=n_slots as i64 - 1));
     let slots = slots.transpose()?;
     slots.iter().try_for_each(|(_, own)| check_shape("slots", own))?;
     let columns = shape[1];
@@ -135,18 +135,17 @@ fn lists_of<const D: usize>(
     let scores = scores.map(|(scores, _)| kept.iter().map(|&at| scores[at] as f32).collect());
     let slots_per_record = released.slots_per_record();
     let lists = neighbors::Neighborhoods::try_new(offsets, records, scores, n, slots_per_record);
+    let mut lists = lists.map_err(raised)?;
+    if let Some((slots, _)) = slots {
+        let slots = kept.iter().map(|&at| slots[at] as u32).collect();
+        lists = lists.with_slots(slots).map_err(raised)?;
+    }
     let order = match needs {
         Needs::Nothing => RowOrder::Either,
         _ => RowOrder::DescriptorRows,
     };
-    let lists = match slots {
-        Some((slots, _)) => {
-            lists.and_then(|l| l.with_slots(kept.iter().map(|&at| slots[at] as u32).collect()))
-        }
-        None => lists,
-    };
     let map = Some(released.fingerprint());
-    Ok(lists.map_err(raised)?.with_about(About { map, order, ..About::default() }))
+    Ok(lists.with_about(About { map, order, ..About::default() }))
 }
 
 /// Converts the result of a function: Neighborhoods, an array of records, or records and scores.

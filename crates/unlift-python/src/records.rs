@@ -8,7 +8,7 @@ use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays};
 use unlift::truth::{DropReason, Dropped};
 use unlift::{Error, OriginalId};
 
-use crate::arrays::{column, indices, is_of_pairs, raised, rows, shape_text, wrong};
+use crate::arrays::{column, is_of_pairs, raised, rows, shape_text, whole, wrong};
 use crate::hidden::{Either, of_either};
 
 /// Records, and the points that they hide; `None` means one point each, in order.
@@ -26,7 +26,7 @@ impl<const D: usize> Hiding<D> {
         let n = obfuscation.len();
         let (mut slots_per_record, mut rows) = (1, None);
         if let Some(hidden) = hidden {
-            let (of, shape) = indices("hidden", hidden, &[1, 2], u32::MAX)?;
+            let (of, shape) = whole("hidden", hidden, &[1, 2], 0..=i64::from(u32::MAX) - 1)?;
             slots_per_record = shape.get(1).copied().unwrap_or(1);
             let max_points = if matches!(obfuscation, Obfuscation::Lines(_)) { 2 } else { 1 };
             if shape[0] != n || !(1..=max_points).contains(&slots_per_record) {
@@ -70,21 +70,15 @@ impl<const D: usize> Hiding<D> {
 #[pyclass(frozen, module = "unlift")]
 pub struct Records(Either<Hiding<2>, Hiding<3>>);
 
-impl Records {
-    fn n_and_family(&self) -> (usize, &'static str) {
-        of_either!(&self.0, of => (of.obfuscation.len(), of.obfuscation.family()))
-    }
-}
-
 #[pymethods]
 impl Records {
     fn __len__(&self) -> usize {
-        self.n_and_family().0
+        of_either!(&self.0, of => of.obfuscation.len())
     }
 
     fn __repr__(&self) -> String {
-        let (n, family) = self.n_and_family();
-        format!("<unlift.Records: {n} {family}>")
+        let family = of_either!(&self.0, of => of.obfuscation.family());
+        format!("<unlift.Records: {} {family}>", self.__len__())
     }
 }
 
@@ -125,8 +119,7 @@ pub fn rays(
 ) -> PyResult<Records> {
     records_by!(centers => {
         let centers = rows("centers", centers)?;
-        let (center, _) = indices("center", center, &[1], centers.len().min(255) as u32)?;
-        let center = center.iter().map(|&at| at as u8).collect();
+        let (center, _) = whole("center", center, &[1], 0..=centers.len().min(255) as i64 - 1)?;
         let rays = Rays::try_new(&centers, center, &rows("directions", directions)?);
         Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)?
     })
@@ -140,8 +133,7 @@ pub fn planes(
     offset: &Bound<'_, PyAny>,
     hidden: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Records> {
-    let (axis, _) = indices("axis", axis, &[1], 3)?;
-    let axis = axis.iter().map(|&at| at as u8).collect();
+    let (axis, _) = whole("axis", axis, &[1], 0..=2)?;
     let planes = AxisPlanes::try_new(axis, &column("offset", offset)?).map_err(raised)?;
     Ok(Records(Either::Map(Hiding::of(Obfuscation::AxisPlanes(planes), hidden)?)))
 }
@@ -155,17 +147,16 @@ pub fn candidates(
     swapped_axis: &Bound<'_, PyAny>,
     hidden: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Records> {
-    let n_axes = if is_of_pairs("positions", positions)? { 2 } else { 3 };
+    let last_axis = if is_of_pairs("positions", positions)? { 1 } else { 2 };
     records_by!(positions => {
         let points = AxisCandidates::try_new(&rows("positions", positions)?).map_err(raised)?;
-        let (axis, _) = indices("swapped_axis", swapped_axis, &[1], n_axes)?;
+        let (axis, _) = whole("swapped_axis", swapped_axis, &[1], 0..=last_axis)?;
         if axis.len() != points.position().len() {
             let expected = format!("{} numbers, one per record", points.position().len());
             return Err(wrong("swapped_axis", expected, axis.len()));
         }
-        let swapped_axis = Some(axis.iter().map(|&at| at as u8).collect());
         let hiding = Hiding::of(Obfuscation::AxisCandidates(points), hidden)?;
-        Hiding { swapped_axis, ..hiding }
+        Hiding { swapped_axis: Some(axis), ..hiding }
     })
 }
 

@@ -12,13 +12,7 @@ use crate::hidden::refused;
 
 /// Results of an audit: numbers, and a page that shows them.
 #[pyclass(frozen, subclass, module = "unlift")]
-pub struct Report(Arc<Audited>);
-
-impl Report {
-    pub fn of(found: Audited) -> Self {
-        Self(Arc::new(found))
-    }
-}
+pub struct Report(pub Arc<Audited>);
 
 #[pymethods]
 impl Report {
