@@ -48,17 +48,17 @@ pub(crate) struct Doubts {
 
 /// Finds the doubts about the figures of a map.
 ///
-/// `usual` holds the distances of its points, `hidden` the given release, if it was not made here, and `of_file` the doubts about
-/// the points. Deltas of tiles are checked one by one, because their mean would hide a tile whose delta collapsed.
+/// `usual` holds the distances of its points, `hidden` the given release, if it was not made here, with the median distance to the K-th
+/// neighbor among all points of its truth, and `of_file` the doubts about the points. Deltas of tiles are checked one by one, because their mean would hide a tile whose delta collapsed.
 pub(crate) fn doubts(
     (original, usual): (&Original<3>, NeighborDistances),
-    hidden: Option<&(Released<3>, Secret)>,
+    hidden: Option<(&(Released<3>, Secret), f64)>,
     (plan, rows, tile_rows): (&Plan<3>, &[Row], &[Vec<Row>]),
     of_file: &[String],
 ) -> Doubts {
-    let NeighborDistances { low, middle, high, n_points } = usual;
+    let NeighborDistances { low, high, n_points, .. } = usual;
     let unit = original.reveal().unit();
-    let of_release = hidden.and_then(|(released, secret)| {
+    let of_release = hidden.and_then(|((released, secret), middle)| {
         of_release(&Truth { original, released, secret }, &plan.thresholds, plan.k, middle)
     });
     let mut notes: Vec<String> = of_release.iter().chain(of_file).cloned().collect();

@@ -37,7 +37,7 @@ fn preparation(
     if k == 0 {
         return Err(wrong("k", "at least 1", k));
     }
-    Ok(Preparation { scale, k, max_points, beside: false, seed })
+    Ok(Preparation { scale, k, max_points, even: false, beside: false, seed })
 }
 
 #[pymethods]

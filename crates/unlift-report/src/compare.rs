@@ -8,6 +8,7 @@ use serde_json::json;
 
 use crate::attack::{self, Basis};
 use crate::document::{Document, Error, Input, Localization, Row};
+use crate::page::verdict::not_tried;
 use crate::results::{Results, distinct};
 use crate::{templates, words};
 
@@ -26,6 +27,9 @@ pub struct Change {
     pub new_percent: f64,
     /// The difference (new minus old) in percentage points.
     pub points: f64,
+    /// The largest difference at which this figure counts as the same: [`Comparison::tolerance_points`], or twice its own spread over
+    /// repeats if that is more.
+    pub tolerance_points: f64,
 }
 
 /// A row that only one audit has.
@@ -62,9 +66,9 @@ pub struct CostsMore {
 /// The comparison of two audits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Largest difference, in percentage points, at which a figure counts as the same.
+    /// Largest difference, in percentage points, at which a figure counts as the same whose own spread is smaller.
     pub tolerance_points: f64,
-    /// The origin of the tolerance: `twice the spread of repeats` or `usual without repeats`.
+    /// The origin of the tolerance: `or twice a figure's own spread over repeats`, or `usual without repeats`.
     pub tolerance_is: &'static str,
     /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs, or of inputs whose difference is accepted.
     pub passed: bool,
@@ -143,7 +147,8 @@ const GROWTH: f64 = 1.1;
 ///
 /// `accepted` lets inputs differ. It lets nothing leak more.
 ///
-/// The tolerance is twice the largest standard deviation over repeats in both audits, or 2 points without repeats.
+/// The tolerance of a figure is twice its larger standard deviation over repeats in both audits. It is at least 2 points, or twice the
+/// largest deviation of any figure if that is less, as few repeats may agree by chance.
 ///
 /// # Errors
 /// Fails if units or thresholds differ, or if no row matches.
@@ -154,6 +159,34 @@ pub fn compare(
 ) -> Result<Comparison, Incomparable> {
     let [was, is] = &[old, new].map(Results::of);
     let within = &common_thresholds(was, is)?;
+    // The largest standard deviation of a share over repeats.
+    let deviations = was.rows.iter().chain(is.rows).filter_map(|row| row.std.as_ref());
+    let deviations =
+        deviations.flat_map(|std| std.recovered_percent.values().chain(std.blind_percent.values()));
+    let twice = |spread: f64| (200.0 * spread).ceil() / 100.0;
+    let largest = deviations.copied().reduce(f64::max);
+    let (tolerance_points, tolerance_is) = match largest {
+        Some(largest) => {
+            (twice(largest).min(USUAL_TOLERANCE), "or twice a figure's own spread over repeats")
+        }
+        None => (USUAL_TOLERANCE, "usual without repeats"),
+    };
+    let spread = |row: &Row, typed: &str| {
+        let std = row.std.as_ref();
+        std.and_then(|std| std.recovered_percent.get(typed)).map_or(0.0, |&own| twice(own))
+    };
+    let of_blind = |of: &Results<'_>, scheme: &str, typed: &str| {
+        let stds = of.of_scheme(scheme).filter_map(|row| row.std.as_ref());
+        let own = stds.filter_map(|std| std.blind_percent.get(typed)).copied();
+        own.map(twice).fold(0.0, f64::max)
+    };
+    let none = |_: [&str; 2]| 0.0;
+    let changes = |of: &Unmatched,
+                   was: &dyn Fn(&str) -> Option<f64>,
+                   is: &dyn Fn(&str) -> Option<f64>,
+                   own: &dyn Fn([&str; 2]) -> f64| {
+        changes(within, of, was, is, |typed| own(typed).max(tolerance_points))
+    };
     let mut all = Vec::new();
     // Attacks of the new audit alone, beside the strongest of the old one. They count if they recover more.
     let (mut only_new, mut new_attacks) = (Vec::new(), Vec::new());
@@ -167,12 +200,13 @@ pub fn compare(
         if let Some(at) = was.rows.iter().zip(&taken).position(is_like) {
             taken[at] = true;
             let before = |typed: &str| was.rows[at].recovered_percent.get(typed).copied();
-            all.extend(changes(within, &of, before, own));
+            let both = |[old, new]: [&str; 2]| spread(&was.rows[at], old).max(spread(row, new));
+            all.extend(changes(&of, &before, &own, &both));
             continue;
         }
         if attack::basis(row) != Basis::Oracle {
             let strongest = |typed: &str| strongest(was, &row.scheme, typed);
-            new_attacks.extend(changes(within, &of, strongest, own));
+            new_attacks.extend(changes(&of, &strongest, &own, &|[_, new]| spread(row, new)));
         }
         only_new.push(of);
     }
@@ -188,38 +222,32 @@ pub fn compare(
     for &scheme in &is.schemes {
         let of = |attack: &str| Unmatched { scheme: scheme.to_owned(), attack: attack.to_owned() };
         let [before, now] = [was, is].map(|of| move |typed: &str| of.blind(scheme, typed));
-        all.extend(changes(within, &of("blind guess"), before, now));
+        let both =
+            |[old, new]: [&str; 2]| of_blind(was, scheme, old).max(of_blind(is, scheme, new));
+        all.extend(changes(&of("blind guess"), &before, &now, &both));
         let alone = of("records alone");
         let [before, now] =
             [was, is].map(|of| move |typed: &str| Some(of.records_alone(scheme, typed)?.0));
-        all.extend(changes(within, &alone, before, now));
+        all.extend(changes(&alone, &before, &now, &none));
         let has_alone =
             [was, is].map(|of| of.of_scheme(scheme).any(|row| row.records_alone_percent.is_some()));
         match has_alone {
             [true, false] => only_old.push(alone),
             [false, true] => {
                 let strongest = |typed: &str| strongest(was, scheme, typed);
-                new_attacks.extend(changes(within, &alone, strongest, now));
+                new_attacks.extend(changes(&alone, &strongest, &now, &none));
                 only_new.push(alone);
             }
             _ => {}
         }
     }
-    // The largest standard deviation of a share over repeats.
-    let deviations = was.rows.iter().chain(is.rows).filter_map(|row| row.std.as_ref());
-    let deviations =
-        deviations.flat_map(|std| std.recovered_percent.values().chain(std.blind_percent.values()));
-    let (tolerance_points, tolerance_is) = match deviations.copied().reduce(f64::max) {
-        Some(spread) => ((200.0 * spread).ceil() / 100.0, "twice the spread of repeats"),
-        None => (USUAL_TOLERANCE, "usual without repeats"),
-    };
     // Rounding errors in the last bit must not fail a build.
-    let beyond = tolerance_points + 1e-9;
+    let is_beyond = |change: &Change, points: f64| points > change.tolerance_points + 1e-9;
     let (mut more, rest): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|change| change.points > beyond);
+        all.into_iter().partition(|change| is_beyond(change, change.points));
     let (mut less, same): (Vec<_>, Vec<_>) =
-        rest.into_iter().partition(|change| change.points < -beyond);
-    more.extend(new_attacks.into_iter().filter(|change: &Change| change.points > beyond));
+        rest.into_iter().partition(|change| is_beyond(change, -change.points));
+    more.extend(new_attacks.into_iter().filter(|change| is_beyond(change, change.points)));
     more.sort_by(|a, b| b.points.total_cmp(&a.points));
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
     let differs = |of: Incomparable| {
@@ -271,16 +299,18 @@ fn changes(
     of: &Unmatched,
     was: impl Fn(&str) -> Option<f64>,
     is: impl Fn(&str) -> Option<f64>,
+    tolerance: impl Fn([&str; 2]) -> f64,
 ) -> Vec<Change> {
-    let change = |[before, after]: &[&str; 2]| {
+    let change = |&[before, after]: &[&str; 2]| {
         let (old_percent, new_percent) = (was(before)?, is(after)?);
         Some(Change {
             scheme: of.scheme.clone(),
             attack: of.attack.clone(),
-            threshold: (*after).to_owned(),
+            threshold: after.to_owned(),
             old_percent,
             new_percent,
             points: new_percent - old_percent,
+            tolerance_points: tolerance([before, after]),
         })
     };
     within.iter().filter_map(change).collect()
@@ -391,7 +421,7 @@ fn lost(old: &Results<'_>, new: &Results<'_>, taken: &[bool]) -> Vec<Lost> {
         } else {
             let otherwise = match new.schemes.contains(&scheme.as_str()) {
                 true => "no attack of the old audit is in the new one",
-                false => "no row in the new audit",
+                false => "no row in the new audit, which names schemes otherwise or lacks this one",
             };
             (None, refused(scheme, None).unwrap_or_else(|| otherwise.to_owned()))
         };
@@ -413,14 +443,14 @@ impl Comparison {
         let [more, less, same] = [&self.more, &self.less, &self.same].map(Vec::len);
         let (points, is) = (self.tolerance_points, self.tolerance_is);
         let point = if points == 1.0 { "point" } else { "points" };
-        let not = if self.is_like() { "" } else { "not comparable: " };
+        let not = if self.is_like() { "" } else { "not like for like: " };
         let mut text = format!(
             "{not}{} figures compared, tolerance {points} {point} ({is}): {more} leak more, {less} less, {same} as before",
             more + less + same
         );
         for (n, what) in [
             (self.costs_more.len(), "localize less precisely"),
-            (self.lost.len(), "cannot be compared any more"),
+            (self.lost.len(), "no longer audited"),
         ] {
             if n > 0 {
                 text.push_str(&format!("; {n} {what}"));
@@ -448,6 +478,7 @@ pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<S
         "style": include_str!("../template/style.css"),
         "comparison": comparison,
         "summary": comparison.summary(),
+        "not_tried": not_tried(&results),
         "share_safe": old.input.path.is_none() && new.input.path.is_none(),
         "audits": audits,
         "thresholds": thresholds.collect::<IndexMap<_, _>>(),

@@ -34,6 +34,11 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     facts(scheme).map_or("", |facts| facts.rule)
 }
 
+/// Returns true if a scheme of ours releases rays from two centers.
+pub(crate) fn has_rays(scheme: &str) -> bool {
+    facts(scheme).is_some_and(|facts| matches!(facts.name, "ray" | "ray-voxel"))
+}
+
 /// Returns a percentage as a part in words: "nearly half".
 pub(crate) fn part(percent: f64) -> &'static str {
     match percent {
@@ -41,7 +46,9 @@ pub(crate) fn part(percent: f64) -> &'static str {
         55.0.. => "more than half",
         50.0.. => "half",
         45.0.. => "nearly half",
-        30.0.. => "a third or more",
+        36.0.. => "more than a third",
+        32.5.. => "a third",
+        30.0.. => "nearly a third",
         _ => "a fifth or more",
     }
 }

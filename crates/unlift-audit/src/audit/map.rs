@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use unlift::PointSet;
 use unlift::audit::doubts::{NeighborDistances, check_truth};
 use unlift::audit::published::{follows_places, read_from_file};
 use unlift::audit::{Alone, Cell, Observer, Plan, Row, run, run_many, run_released};
@@ -74,7 +75,11 @@ impl Map<'_> {
         let of_hidden = release.is_some_and(|(released, _)| released.descriptors().is_some());
         let mut tried = Tried::by(plan, descriptors.is_some() || of_hidden);
         tried.localizes = localize.is_some() && !prepared.cameras.views.is_empty();
-        let remarks = &audit.remarks;
+        let mut remarks = audit.remarks.clone();
+        if release.is_some() && plan.repeats > 1 {
+            let note = "repeats: the records of the file stay the same; for their randomness, write and audit several files";
+            remarks.notes.push(note.to_owned());
+        }
         check_gates(&audit.gates, &tried, Some(points))?;
         remarks.doubts.iter().chain(&remarks.notes).for_each(|note| progress.note(note));
         let of_file = |error| match &audit.about.path {
@@ -148,6 +153,14 @@ impl Map<'_> {
         let mut of_points = remarks.doubts.clone();
         of_points.extend(release.iter().flat_map(|release| follows_places(original, release)));
         let rows = (plan, &outcome.rows[..], &tile_rows[..]);
+        // Points that are in no record, as of a thinned map, count for the unit.
+        let all = (prepared.input.positions.len() > points.len())
+            .then(|| PointSet::try_new(prepared.input.positions.clone(), points.unit()));
+        let of_all = match all.transpose()? {
+            Some(all) => NeighborDistances::of(std::iter::once(Ok(&all)), plan.k)?.middle,
+            None => usual.middle,
+        };
+        let release = release.map(|release| (release, of_all));
         let doubts = doubts((original, usual), release, rows, &of_points);
         for note in doubts.notes.iter().filter(|note| !remarks.doubts.contains(note)) {
             progress.note(note);

@@ -31,6 +31,8 @@ pub struct Preparation {
     pub k: usize,
     /// Size of the random subset.
     pub max_points: Option<usize>,
+    /// Whether the last of an odd number of points is left out, so that schemes that pair points hide the same ones as all others.
+    pub even: bool,
     /// Whether descriptors that lie beside a COLMAP model are read if no file of them is given.
     pub beside: bool,
     /// Seed of the subset.
@@ -43,7 +45,7 @@ pub(crate) const USUAL_K: usize = 50;
 /// All points, in the unit of the median distance to the 50th neighbor.
 impl Default for Preparation {
     fn default() -> Self {
-        Self { scale: None, k: USUAL_K, max_points: None, beside: false, seed: 0 }
+        Self { scale: None, k: USUAL_K, max_points: None, even: false, beside: false, seed: 0 }
     }
 }
 
@@ -150,6 +152,7 @@ pub fn open(
         let error = crate::Error::from(unlift_io::Error::core(path, error));
         if few { error.advise("a smaller --k, or more points") } else { error }
     })?;
+    remarks.notes.append(&mut prepared.remarks.notes);
     remarks.doubts.append(&mut prepared.remarks.doubts);
     // `prepared.rows` counts the points with a place only.
     prepared.rows = rows_of_file(&prepared.rows, &input.left_out);
@@ -218,18 +221,24 @@ pub fn prepare<'a>(
     preparation: &Preparation,
 ) -> Result<Prepared, Error> {
     let positions = positions.into();
-    let (n_read, mut doubts) = (positions.len(), Vec::new());
+    let n_read = positions.len();
+    let mut remarks = Remarks::default();
     let mut rows: Vec<u32> = (0..n_read as u32).collect();
     if let Some(max_points) = preparation.max_points
         && rows.len() > max_points
     {
-        doubts.push(format!(
+        remarks.doubts.push(format!(
             "--max-points: {max_points} of {n_read} points are audited; the whole map is denser, so more of it is \
              recovered"
         ));
         Draws::new(preparation.seed, Stage::Subset, 0).shuffle(&mut rows);
         rows.truncate(max_points);
         rows.sort_unstable();
+    }
+    if preparation.even && rows.len() % 2 == 1 {
+        rows.pop();
+        let note = "1 point is left out, so that schemes that pair points hide the same ones as all others";
+        remarks.notes.push(note.to_owned());
     }
     let k = preparation.k;
     if rows.len() <= k {
@@ -257,7 +266,6 @@ pub fn prepare<'a>(
     let points = if factor == 1.0 { points } else { points.scaled(factor, unit)? };
     let descriptors = descriptors.map(|all| all.select(&rows));
     let prepared = Prepared::of(Original::new(points));
-    let remarks = Remarks { doubts, ..Remarks::default() };
     Ok(Prepared { descriptors, unit_in_map_units, rows, remarks, ..prepared })
 }
 
@@ -332,7 +340,7 @@ mod tests {
     use super::*;
 
     const PLAIN: Preparation =
-        Preparation { scale: None, k: 2, max_points: None, beside: false, seed: 0 };
+        Preparation { scale: None, k: 2, max_points: None, even: false, beside: false, seed: 0 };
 
     /// Points 0.5 apart on a line; the second neighbor is 0.5 away except at the ends.
     fn line(n: usize) -> Vec<[f64; 3]> {
@@ -355,6 +363,16 @@ mod tests {
             (vec![[1.0; 3]; 5], coincide),
         ] {
             assert_eq!(prepare(points, None, &PLAIN).unwrap_err().to_string(), expected);
+        }
+    }
+
+    #[test]
+    fn of_an_odd_number_the_last_point_is_left_out() {
+        let even = Preparation { even: true, ..PLAIN };
+        for (n, kept) in [(9, 8), (8, 8)] {
+            let prepared = prepare(line(n), None, &even).unwrap();
+            assert_eq!(prepared.rows, (0..kept).collect::<Vec<u32>>());
+            assert_eq!(prepared.remarks.notes.len(), n - kept as usize);
         }
     }
 

@@ -122,7 +122,7 @@ fn an_audit_of_a_model_with_tracks_says_what_protection_costs() {
     // Names and poses of images do not appear.
     let page = audited.page(true).unwrap();
     assert!(page.contains("What protection costs") && !page.contains("03.jpg"));
-    assert!(page.contains("olc_bits2: its descriptors are changed"));
+    assert!(page.contains("olc_bits2, whose descriptors are changed"));
 }
 
 #[test]

@@ -118,7 +118,8 @@ pub fn map(args: &AuditMapArgs) -> crate::Result<bool> {
     let more = more.chain(NeighborSource::files(&args.solvers.neighbors));
     perform(&args.audit, &args.path, more, |audit| {
         let AuditArgs { seed, quiet, .. } = args.audit;
-        let mut prepared = open_map(&args.path, &args.map, args.uses_descriptors(), (seed, quiet))?;
+        let mut prepared =
+            open_map(&args.path, &args.map, (true, args.uses_descriptors()), (seed, quiet))?;
         let progress = Progress::new(quiet);
         let has_ratios = args.full || !args.oracle.inlier_ratios.is_empty();
         let inversion = match &args.paint.invert {

@@ -23,11 +23,11 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> crate::Result<T> + Send) -> 
     pool.install(work)
 }
 
-/// Reads and prepares a map, for `audit map` and `obfuscate`. Descriptors that lie beside the model are read with `beside`.
+/// Reads and prepares a map: an `even` number of points, as in an audit, or all. Descriptors that lie beside the model are read with `beside`.
 pub fn open_map(
     path: &Path,
     args: &MapArgs,
-    beside: bool,
+    (even, beside): (bool, bool),
     (seed, quiet): (u64, bool),
 ) -> crate::Result<Prepared> {
     let _alive = Progress::uncounted(quiet, "reading the map");
@@ -35,6 +35,7 @@ pub fn open_map(
         scale: args.scale,
         k: usize::from(args.k),
         max_points: args.max_points.map(NonZeroUsize::get),
+        even,
         beside,
         seed,
     };

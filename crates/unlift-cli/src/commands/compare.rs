@@ -49,9 +49,9 @@ pub fn run(args: &CompareArgs) -> crate::Result<bool> {
 
 fn text(comparison: &Comparison, out: Option<&Path>) -> String {
     let accepted = match &comparison.accepted {
-        None => "NOT COMPARED".to_owned(),
+        None => "OTHER INPUT".to_owned(),
         Some(accepted) if accepted.past => {
-            format!("NOT COMPARED, as --accept ended on {}", accepted.until)
+            format!("OTHER INPUT, and --accept ended on {}", accepted.until)
         }
         Some(accepted) => format!("accepted until {} ({})", accepted.until, accepted.reason),
     };
@@ -85,7 +85,7 @@ fn text(comparison: &Comparison, out: Option<&Path>) -> String {
     }
     for lost in &comparison.lost {
         let by = lost.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
-        lines.push(format!("OUT OF VIEW: {}{by}: {}", lost.scheme, lost.reason));
+        lines.push(format!("NO LONGER AUDITED: {}{by}: {}", lost.scheme, lost.reason));
     }
     lines.iter().for_each(|line| text.push_str(&format!("{}\n", OneLine(line))));
     text.push_str(&format!("{}\n", comparison.summary()));

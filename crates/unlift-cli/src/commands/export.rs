@@ -101,11 +101,13 @@ fn points(args: &ExportArgs) -> crate::Result<Points> {
         }
         Stage::Neighborhoods | Stage::PointNeighborhoods => return wrong("neighborhoods"),
     };
-    let Some(scale) = args.scale else { return Ok(points) };
-    if unit != Unit::Meter {
+    let options = [("--scale", args.scale.is_some()), ("--cameras", args.cameras.is_some())];
+    let option = options.into_iter().find(|(_, given)| *given && unit != Unit::Meter);
+    if let Some((option, _)) = option {
         let (path, unit) = (path.display(), unit.name());
-        bail!("--scale: expected a file in meters (obfuscate --scale), found {path} in {unit}");
+        bail!("{option}: expected a file in meters (obfuscate --scale), found {path} in {unit}");
     }
+    let Some(scale) = args.scale else { return Ok(points) };
     points.iter_mut().flatten().for_each(|point| *point = point.map(|x| x / scale));
     Ok(points)
 }

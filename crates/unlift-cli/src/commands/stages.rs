@@ -96,7 +96,11 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
         return obfuscate_images(args, out);
     };
-    let prepared = open_map(&args.path, map, false, (args.seed.unwrap_or(0), false))?;
+    let audit = args.audit.as_deref();
+    let audit =
+        audit.map(|path| Ok::<_, crate::Error>((path, read_document(path)?))).transpose()?;
+    let even = audit.as_ref().is_some_and(|(_, audit)| audit.input.n_points.is_multiple_of(2));
+    let prepared = open_map(&args.path, map, (even, false), (args.seed.unwrap_or(0), false))?;
     prepared.remarks.doubts.iter().chain(&prepared.remarks.notes).for_each(output::note);
     let public = |kind| public(args.public_descriptors.as_deref(), kind);
     let protections = protections_of_map(args.protect_descriptors.as_slice(), &prepared, public)?;
@@ -107,11 +111,11 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
         None => scheme,
     };
     let name = scheme.name();
-    let leak = match &args.audit {
-        Some(path) => {
+    let leak = match audit {
+        Some((path, audit)) => {
             let public = public_name(args.public_descriptors.as_deref());
             let public = args.protect_descriptors.as_ref().map(|_| public);
-            let leak = leak(&read_document(path)?, &prepared.about(&args.path)?, name, public);
+            let leak = leak(&audit, &prepared.about(&args.path)?, name, public);
             Some(leak.map_err(|of| FileError::new(path, of.place, of.expected, of.found))?)
         }
         None => None,
@@ -136,7 +140,12 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     print(&format!(
         "{name}: {slots} points hidden in {records} records, {dropped} dropped, in {folder}\n"
     ))?;
-    leak.map_or(Ok(()), |leak| print(&format!("audited: {leak}\n")))
+    let Some(leak) = leak else { return Ok(()) };
+    let key = match args.seed {
+        None => " The key of this release is another: attack it, too (unlift audit released).",
+        Some(_) => "",
+    };
+    print(&format!("audited: {leak}{key}\n"))
 }
 
 /// Returns the key from which all randomness comes.

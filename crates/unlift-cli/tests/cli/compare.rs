@@ -58,7 +58,7 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         place.write(name, document.to_string());
     }
     let usual = "tolerance 2 points (usual without repeats): ";
-    let spread = "tolerance 1.21 points (twice the spread of repeats): ";
+    let spread = "tolerance 1.21 points (or twice a figure's own spread over repeats): ";
     for (files, code, tolerance, expected) in [
         ("was.json was.json", 0, usual, "0 leak more, 0 less, 20 as before\n"),
         ("old.json new.json", 1, usual, "1 leak more, 0 less, 19 as before\n"),
@@ -71,18 +71,16 @@ fn what_leaks_more_or_is_out_of_view_fails() {
     ] {
         let (text, _) = place.ends(&format!("compare {files}"), code);
         assert!(text.contains(&format!("{tolerance}{expected}")), "{files}: {text}");
-        assert_eq!(text.contains("OUT OF VIEW: ppl: no row"), files.contains("gone"), "{text}");
+        assert_eq!(text.contains("NO LONGER AUDITED: ppl: no row"), files.contains("gone"), "{text}");
     }
     for name in ["map.json", "scale.json", "database.json", "attack.json", "unnamed.json"] {
         let (text, _) = place.ends(&format!("compare was.json {name}"), 1);
-        assert!(
-            text.starts_with("NOT COMPARED: ") && text.contains("\nnot comparable: "),
-            "{text}"
-        );
+        let start = if name == "attack.json" { "NOT COMPARED: only in" } else { "OTHER INPUT: " };
+        assert!(text.starts_with(start) && text.contains("\nnot like for like: "), "{text}");
     }
     for (name, until, code, start) in [
         ("map.json", "2999-12-31", 0, "accepted until 2999-12-31 (new-rooms): "),
-        ("map.json", "2020-02-29", 1, "NOT COMPARED, as --accept ended on 2020-02-29: "),
+        ("map.json", "2020-02-29", 1, "OTHER INPUT, and --accept ended on 2020-02-29: "),
         // An attack that is gone cannot be accepted.
         ("attack.json", "2999-12-31", 1, "NOT COMPARED: only in the old audit"),
     ] {

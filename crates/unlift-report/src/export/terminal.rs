@@ -5,7 +5,7 @@ use unlift::Unit;
 use crate::attack::{self, Basis};
 use crate::document::{Bound, Document, NotAudited, Row, STRONGEST};
 use crate::page::cost;
-use crate::page::tables::percent_cell;
+use crate::page::tables::{SPREAD_THAT_COUNTS, percent_cell};
 use crate::page::verdict::{self, Card, Verdict};
 use crate::results::Results;
 use crate::table::{Column, Table, figure, label};
@@ -19,7 +19,7 @@ use crate::words::{self, percent_or_dash};
 pub fn text_table(document: &Document) -> String {
     let results = &Results::of(document);
     let Verdict { banner, cards, .. } = verdict::verdict(results);
-    let extent = document.input.extent().map(|extent| format!(" ({extent})"));
+    let extent = document.input.extent().map(|extent| format!(" ({extent}, without outliers)"));
     let extent = extent.unwrap_or_default();
     let lines = |sentences: Vec<String>| {
         let lines =
@@ -68,8 +68,12 @@ fn by_scheme(results: &Results<'_>, cards: &[Card]) -> String {
     let more = results.rows.len() - shown;
     if more > 0 {
         text.push_str(&format!(
-            "{more} more attacks, of other inlier ratios or solvers, are in the report\n"
+            "not shown, but in the report: {more} of other inlier ratios or solvers\n"
         ));
+    }
+    if results.rows.iter().any(|row| row.std.is_some()) {
+        let least = SPREAD_THAT_COUNTS;
+        text.push_str(&format!("±: standard deviation over seeds, shown above {least}\n"));
     }
     text.push_str(&cost::text(results));
     for NotAudited { scheme, neighbors, reason, .. } in &results.document.not_audited {

@@ -77,19 +77,22 @@ fn basis(results: &Results<'_>) -> Basis {
 
 /// Returns the schemes that the chart shows, and those that it does not, with the reasons.
 fn points<'a>(results: &Results<'a>) -> (Vec<Point<'a>>, Vec<String>) {
-    let (mut points, mut missing) = (Vec::new(), Vec::new());
+    let (mut points, mut changed, mut missing) = (Vec::new(), Vec::new(), Vec::new());
     let of_map = |of: &&Localization| !of.of_queries && of.scheme != UNPROTECTED;
     for of in results.document.localization.iter().filter(of_map) {
         match leak(results, of) {
-            _ if of.is_unknown() => missing.push(format!(
-                "{}: its descriptors are changed, so only {FEWEST_HELD_OUT} or more held-out images tell the cost",
-                of.scheme
-            )),
+            _ if of.is_unknown() => changed.push(of.scheme.as_str()),
             None => missing.push(format!("{}: this attack was not tried on it", of.scheme)),
             Some(leak) => {
                 points.push(Point { of, leak, cost: of.cost().unwrap_or(f64::INFINITY) });
             }
         }
+    }
+    if !changed.is_empty() {
+        let names = words::list(&changed);
+        missing.push(format!(
+            "{names}, whose descriptors are changed, so that only {FEWEST_HELD_OUT} or more held-out images tell the cost"
+        ));
     }
     (points, missing)
 }
@@ -208,12 +211,6 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     let number = |value: Option<f64>| known(value, |value| words::significant(value, 3));
     let percent = |value: Option<f64>| known(value, words::percent);
     let length = |value: Option<f64>| known(value, |value| words::length(value, results.unit));
-    let released = |of: &Of| {
-        results.of_scheme(&of.scheme).next().map_or(1.0, |row| {
-            let dropped: usize = row.dropped.values().sum();
-            row.n_points as f64 / (row.n_points + dropped).max(1) as f64
-        })
-    };
     let protects = |of: &Of| match (of.scheme.as_str(), of.of_queries) {
         (UNPROTECTED, _) => "nothing".to_owned(),
         (_, true) => "the query".to_owned(),
@@ -224,7 +221,7 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
         label("protects", protects),
         figure("come back, % of released", move |of: &Of| percent(leak(results, of))),
         figure("% of all points", move |of: &Of| {
-            percent(leak(results, of).map(|leak| leak * released(of)))
+            percent(leak(results, of).map(|leak| leak * released(results, of)))
         }),
         figure("bound: times unprotected", move |of: &Of| number(bound(of, of.multiple))),
         figure("camera center", move |of: &Of| length(bound(of, of.center_error))),
@@ -253,6 +250,14 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     Some(Table::of("cost", caption, localization, columns))
 }
 
+/// Returns the fraction of all points that is released.
+fn released(results: &Results<'_>, of: &Localization) -> f64 {
+    results.of_scheme(&of.scheme).next().map_or(1.0, |row| {
+        let dropped: usize = row.dropped.values().sum();
+        row.n_points as f64 / (row.n_points + dropped).max(1) as f64
+    })
+}
+
 /// Returns a value of the bound, which says nothing about changed descriptors.
 fn bound(of: &Localization, value: Option<f64>) -> Option<f64> {
     value.filter(|_| !of.changes_descriptors)
@@ -266,7 +271,7 @@ pub(crate) fn text(results: &Results<'_>) -> String {
     }
     let percent = words::percent_or_dash;
     let leaks = if basis(results) == Basis::Oracle { "leak by oracle" } else { "leak today" };
-    let columns = vec![
+    let mut columns = vec![
         label("scheme", |of: &Localization| of.scheme.clone()),
         figure(leaks, move |of: &Localization| percent(leak(results, of))),
         figure("localization error", |of: &Localization| match of.cost() {
@@ -274,15 +279,26 @@ pub(crate) fn text(results: &Results<'_>) -> String {
             None if of.is_unknown() => "not known".to_owned(),
             None => "does not localize".to_owned(),
         }),
-        label("by", |of: &Localization| match of.measured() {
-            Some(held_out) => format!("{} held-out images", held_out.n_images),
-            None => "bound".to_owned(),
+        label("by", |of: &Localization| match (of.measured(), &of.held_out) {
+            (Some(held_out), _) => format!("{} held-out images", held_out.n_images),
+            (None, Some(few)) if of.is_unknown() => {
+                format!("{} held-out images, {FEWEST_HELD_OUT} are needed", few.n_images)
+            }
+            (None, _) => "bound".to_owned(),
         }),
         // This percentage is of the bound.
         figure("not localized", move |of: &Localization| {
             percent(bound(of, Some(of.failed_percent)).filter(|_| of.measured().is_none()))
         }),
     ];
+    if localization.iter().any(|of| released(results, of) < 0.9) {
+        columns.insert(
+            2,
+            figure("of all points", |of: &Localization| {
+                percent(leak(results, of).map(|leak| leak * released(results, of)))
+            }),
+        );
+    }
     let of_map = localization.iter().filter(|of| !of.of_queries);
     let table = Table::of("cost", "", of_map, columns).text();
     let (points, missing) = points(results);

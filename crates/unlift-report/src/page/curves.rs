@@ -21,23 +21,27 @@ pub(crate) fn findings(results: &Results<'_>) -> Value {
 const FLAT: f64 = 0.9;
 const STEEP: f64 = 0.5;
 
-/// Returns how much wrong neighbors reduce the recovery: the best oracle rows at the lowest and highest tested ratio.
+/// Returns how much wrong neighbors reduce the recovery: the best oracle rows at the lowest and highest tested ratio, of given records
+/// if there are any.
 fn wrong_neighbors(results: &Results<'_>) -> Option<Value> {
-    let oracle = results.rows.iter().filter(|row| attack::basis(row) == Basis::Oracle);
-    let share = |ratio: f64| {
-        let rows = oracle.clone().filter(move |row| row.inlier_ratio == ratio);
-        rows.map(|row| results.share(row)).fold(0.0, f64::max)
-    };
+    let given = results.given_records();
+    let oracle = results.rows.iter().filter(|row| {
+        attack::basis(row) == Basis::Oracle && given.is_none_or(|given| row.scheme == given)
+    });
+    let best =
+        |ratio: f64| results.largest(oracle.clone().filter(move |row| row.inlier_ratio == ratio));
     let ratios = oracle.clone().map(|row| row.inlier_ratio);
     let (low, high) = (ratios.clone().fold(f64::INFINITY, f64::min), ratios.fold(0.0, f64::max));
     // Mostly right neighbors show nothing about wrong ones.
     if low >= high || low > 0.2 {
         return None;
     }
-    let kept = share(low) / share(high).max(f64::MIN_POSITIVE);
+    let (worst, best) = (best(low)?, best(high)?);
+    let kept = results.share(worst) / results.share(best).max(f64::MIN_POSITIVE);
     Some(json!({
+        "scheme": worst.scheme,
         "wrong": words::ratio_percent(1.0 - low),
-        "recovered": words::percent(share(low)),
+        "recovered": words::percent(results.share(worst)),
         "matter": if kept >= FLAT { "hardly" } else if kept >= STEEP { "little" } else { "much" },
     }))
 }

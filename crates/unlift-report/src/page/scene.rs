@@ -229,11 +229,8 @@ struct Fate {
 impl Fate {
     /// Returns a sentence: "3,861 of 3,895 points drawn; 34 not released".
     fn in_words(&self) -> String {
-        let missing = [
-            (self.withheld, "not released"),
-            (self.lost, "lost"),
-            (self.outside, "outside the box"),
-        ];
+        let missing =
+            [(self.withheld, "not released"), (self.lost, "lost"), (self.outside, "far outside")];
         let missing = missing.into_iter().filter(|(n, _)| *n > 0);
         let missing: Vec<String> =
             missing.map(|(n, what)| format!("{} {what}", words::thousands(n))).collect();

@@ -307,7 +307,7 @@ pub(crate) fn objects(results: &Results<'_>) -> Option<Table> {
 }
 
 /// Standard deviations over seeds up to this many percentage points are not shown.
-const SPREAD_THAT_COUNTS: f64 = 0.5;
+pub(crate) const SPREAD_THAT_COUNTS: f64 = 0.5;
 
 /// Returns the cell of a percentage, with its standard deviation over seeds if that is above [`SPREAD_THAT_COUNTS`].
 pub(crate) fn percent_cell(value: Option<&f64>, spread: Option<&f64>) -> String {

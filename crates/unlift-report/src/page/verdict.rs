@@ -314,6 +314,9 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     Banner { level, headline, sentence: sentences.join(" "), every, unknown }
 }
 
+/// Schemes that the headline names if there are more.
+const MAX_NAMED: usize = 4;
+
 /// Returns whether to release, by what came back from the released data alone, and the reasons. A small leak decides nothing
 /// before the best attack by descriptors was tried, or if figures are doubtful.
 fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
@@ -326,11 +329,19 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         }
     }
     much.sort_by(|a, b| b.recovered.total_cmp(&a.recovered));
-    let names = |leaks: &[&Finding]| {
-        words::list(&leaks.iter().map(|leak| leak.scheme.as_str()).collect::<Vec<_>>())
-    };
+    fn schemes<'f>(leaks: &[&'f Finding]) -> Vec<&'f str> {
+        leaks.iter().map(|leak| leak.scheme.as_str()).collect()
+    }
+    let names = |leaks: &[&Finding]| words::list(&schemes(leaks));
     let what = results.subject();
-    let not = format!("Do not release {what} under {}.", names(&much));
+    let under = match &much[..] {
+        [first @ .., _] if first.len() >= MAX_NAMED => {
+            let more = format!("{} more of the schemes tried", much.len() - MAX_NAMED);
+            words::list(&[&schemes(&much[..MAX_NAMED])[..], &[&more]].concat())
+        }
+        few => names(few),
+    };
+    let not = format!("Do not release {what} under {under}.");
     let undecided = words::list(&undecided);
     let open = (!undecided.is_empty()).then(|| format!("Nothing is decided about {undecided}."));
     if let Some(largest) = largest(little.iter().copied()) {
@@ -350,9 +361,10 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
             results.points(),
             results.within(results.headline)
         );
+        let more = open.into_iter().chain(pictures(&little));
         return match much.is_empty() {
-            true => (under, open.into_iter().collect()),
-            false => (not, [under].into_iter().chain(open).collect()),
+            true => (under, more.collect()),
+            false => (not, [under].into_iter().chain(more).collect()),
         };
     }
     let Some(least) = much.last() else {
@@ -362,17 +374,38 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         true => format!("Do not release {what} under any scheme tried."),
         false => not,
     };
+    let useful = much.iter().rev().find(|leak| localizes(results, &leak.scheme)).unwrap_or(least);
     let reason = (much.len() > 1).then(|| {
         let ends = least.interval.map(|of| words::interval(of) + ", ").unwrap_or_default();
         let (percent, part) = (&least.percent, words::part(least.recovered));
-        format!(
-            "The least leak{}, {percent} % ({ends}{}), is {part} of the {}.",
+        let mut reason = format!(
+            "The least leak{}, {percent} % ({ends}{}), is {part} of the {}",
             if open.is_some() { " of these" } else { "" },
             least.scheme,
             results.points()
-        )
+        );
+        if useful.scheme != least.scheme {
+            let Finding { scheme, percent, .. } = useful;
+            reason.push_str(
+                ", but most cameras cannot be placed under it; of the schemes that place them, ",
+            );
+            reason.push_str(&format!("{scheme} leaks least, {percent} %"));
+        }
+        reason + "."
     });
-    (headline, reason.into_iter().chain(open).collect())
+    (headline, reason.into_iter().chain(open).chain(pictures(&[useful])).collect())
+}
+
+/// Returns what is seen of the scene without an attack under those schemes that release rays from two centers.
+fn pictures(leaks: &[&Finding]) -> Option<String> {
+    let rays = leaks.iter().map(|leak| leak.scheme.as_str());
+    let rays: Vec<&str> = rays.filter(|name| words::has_rays(name)).collect();
+    (!rays.is_empty()).then(|| {
+        let names = words::list(&rays);
+        format!(
+            "Without any attack, the rays of {names} show the scene from two published centers."
+        )
+    })
 }
 
 /// Returns the cards whose schemes localize, if there are any, else all.
