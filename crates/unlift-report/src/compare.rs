@@ -421,7 +421,10 @@ fn lost(old: &Results<'_>, new: &Results<'_>, taken: &[bool]) -> Vec<Lost> {
         } else {
             let otherwise = match new.schemes.contains(&scheme.as_str()) {
                 true => "no attack of the old audit is in the new one",
-                false => "no row in the new audit, which names schemes otherwise or lacks this one",
+                false if words::facts(scheme).is_none() => {
+                    "no row in the new audit; to compare two versions of your scheme, give both audits the same --name"
+                }
+                false => "no row in the new audit",
             };
             (None, refused(scheme, None).unwrap_or_else(|| otherwise.to_owned()))
         };

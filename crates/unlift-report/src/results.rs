@@ -53,6 +53,13 @@ impl<'a> Results<'a> {
         if self.is_of_images() { "these images" } else { "this map" }
     }
 
+    /// Returns the K of the audit, which the oracle uses; other sources choose their own.
+    pub(crate) fn k(&self) -> usize {
+        let oracle = self.rows.iter().find(|row| attack::is_oracle(&row.neighbors));
+        let typed = self.document.options.get("k").and_then(|k| k.as_u64());
+        oracle.map(|row| row.k).or(typed.map(|k| k as usize)).unwrap_or(50)
+    }
+
     /// Returns a sentence for each doubt about the figures.
     pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + use<'a> {
         let sentence = |doubt: &String| {

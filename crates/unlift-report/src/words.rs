@@ -54,7 +54,7 @@ pub(crate) fn part(percent: f64) -> &'static str {
 }
 
 /// The unit of a map without a scale, in words; the page defines it once.
-pub(crate) const USUAL_DISTANCE: &str = "the usual distance to the K-th neighbor";
+pub(crate) const USUAL_DISTANCE: &str = "the median distance to the K-th neighbor";
 
 /// Returns the sign of a unit on the page; × is times [`USUAL_DISTANCE`].
 pub(crate) fn sign(unit: Unit) -> &'static str {

@@ -63,7 +63,7 @@ fn by_scheme(results: &Results<'_>, cards: &[Card]) -> String {
     }
     text.push_str("true: share of the listed neighbors that are among the nearest\n");
     if results.unit == Unit::KthNeighbor {
-        text.push_str(&format!("x: times {}\n", words::USUAL_DISTANCE));
+        text.push_str(&format!("x: times {} (K = {})\n", words::USUAL_DISTANCE, results.k()));
     }
     let more = results.rows.len() - shown;
     if more > 0 {

@@ -291,7 +291,8 @@ pub(crate) fn text(results: &Results<'_>) -> String {
             percent(bound(of, Some(of.failed_percent)).filter(|_| of.measured().is_none()))
         }),
     ];
-    if localization.iter().any(|of| released(results, of) < 0.9) {
+    let leaves_out = localization.iter().any(|of| released(results, of) < 0.9);
+    if leaves_out {
         columns.insert(
             2,
             figure("of all points", |of: &Localization| {
@@ -306,5 +307,6 @@ pub(crate) fn text(results: &Results<'_>) -> String {
         true => String::new(),
         false => sentence(results, &points, &missing),
     };
-    format!("\n{table}{sentence}\n")
+    let of_what = if leaves_out { "leak: percent of the released points\n" } else { "" };
+    format!("\n{table}{of_what}{sentence}\n")
 }

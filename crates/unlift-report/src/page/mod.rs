@@ -149,10 +149,6 @@ fn turns(c: char) -> bool {
 
 fn subject(results: &Results<'_>) -> Value {
     let input = &results.document.input;
-    // The oracle uses the K of the audit; other sources choose their own.
-    let oracle = results.rows.iter().find(|row| attack::is_oracle(&row.neighbors));
-    let typed = results.document.options.get("k").and_then(Value::as_u64);
-    let k = oracle.map(|row| row.k).or(typed.map(|k| k as usize)).unwrap_or(50);
     json!({
         // The last telling part of the path; the whole path is in the last section.
         "name": input.path.as_deref().map(short_name),
@@ -164,7 +160,7 @@ fn subject(results: &Results<'_>) -> Value {
         "size": input.size(),
         "scale": input.scale_m_per_unit.map(|scale| scale.to_string()),
         "map_units": input.unit_in_map_units.map(|unit| words::significant(unit, 4)),
-        "kth": words::ordinal(k),
+        "kth": words::ordinal(results.k()),
         "usual_distance": words::USUAL_DISTANCE,
     })
 }

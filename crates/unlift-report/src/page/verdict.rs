@@ -315,7 +315,7 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
 }
 
 /// Schemes that the headline names if there are more.
-const MAX_NAMED: usize = 4;
+const MAX_NAMED: usize = 7;
 
 /// Returns whether to release, by what came back from the released data alone, and the reasons. A small leak decides nothing
 /// before the best attack by descriptors was tried, or if figures are doubtful.

@@ -88,11 +88,10 @@ impl<'a> Held<'a> {
         let is_held = |at: usize| at % nth == nth / 2;
         let n_held = (0..photos.len()).filter(|&at| is_held(at)).count();
         if n_held == 0 || photos.len() - n_held < FEWEST_OTHERS {
-            let expected = format!(
-                "of an image to hold out, and of at least {FEWEST_OTHERS} others of the map"
-            );
-            let found = format!("{} images, {n_held} of them to hold out", photos.len());
-            return Err(Error::new("features", expected, found));
+            let expected =
+                format!("1 to hold out and {FEWEST_OTHERS} others (another --hold-out?)");
+            let found = format!("{}, of which {n_held} to hold out", photos.len());
+            return Err(Error::new("images with features", expected, found));
         }
         let dim = photos[0].descriptors.dim();
         if let Some(photo) = photos.iter().find(|photo| photo.descriptors.dim() != dim) {
