@@ -192,7 +192,7 @@ fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
     let (is_usual, found) = ((UNIT[0]..=UNIT[1]).contains(&middle), short(middle));
     let doubt = format!(
         "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, because the file \
-         states lengths in multiples of it, found {found}: thresholds do not have their stated meaning (another --k?)"
+         states lengths in multiples of it, found {found}: thresholds do not have their stated meaning (divide lengths by it, or another --k?)"
     );
     (unit == Unit::KthNeighbor && !is_usual).then_some(doubt)
 }
