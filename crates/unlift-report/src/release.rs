@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::compare::{Incomparable, different};
 use crate::document::{Document, GateResult, Input};
-use crate::page::verdict::{Finding, Level, card, is_decided, localizes};
+use crate::page::verdict::{Finding, Level, card, is_decided, localizes, pictures};
 use crate::results::Results;
 
 /// Returns what the attacks of `document` recover from `input` under `scheme`: "Do not release this. Today, from the released
@@ -73,6 +73,7 @@ pub fn leak(
         Some(_) => None,
     };
     sentences.splice(0..0, verdict.map(str::to_owned).into_iter().chain(results.doubts()));
+    sentences.extend(pictures(&[scheme]));
     if !localizes(&results, scheme) {
         sentences.push("Most cameras cannot be placed with it.".to_owned());
     }

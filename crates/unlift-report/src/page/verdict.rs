@@ -328,22 +328,28 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
             _ => undecided.push(card.scheme.as_str()),
         }
     }
+    let schemes: Vec<&str> = cards.iter().map(|card| &*card.scheme).collect();
     much.sort_by(|a, b| b.recovered.total_cmp(&a.recovered));
-    fn schemes<'f>(leaks: &[&'f Finding]) -> Vec<&'f str> {
+    fn schemes_of<'f>(leaks: &[&'f Finding]) -> Vec<&'f str> {
         leaks.iter().map(|leak| leak.scheme.as_str()).collect()
     }
-    let names = |leaks: &[&Finding]| words::list(&schemes(leaks));
+    let names = |leaks: &[&Finding]| words::list(&schemes_of(leaks));
     let what = results.subject();
     let under = match &much[..] {
         [first @ .., _] if first.len() >= MAX_NAMED => {
             let more = format!("{} more of the schemes tried", much.len() - MAX_NAMED);
-            words::list(&[&schemes(&much[..MAX_NAMED])[..], &[&more]].concat())
+            words::list(&[&schemes_of(&much[..MAX_NAMED])[..], &[&more]].concat())
         }
         few => names(few),
     };
     let not = format!("Do not release {what} under {under}.");
     let undecided = words::list(&undecided);
-    let open = (!undecided.is_empty()).then(|| format!("Nothing is decided about {undecided}."));
+    let why = match results.document.doubts.is_empty() {
+        true => "the best attack by descriptors was not tried",
+        false => "figures are doubtful",
+    };
+    let open = format!("Nothing is decided about {undecided}, as {why}.");
+    let open = (!undecided.is_empty()).then_some(open);
     if let Some(largest) = largest(little.iter().copied()) {
         let useless = little.iter().filter(|leak| !localizes(results, &leak.scheme));
         let useless: Vec<&Finding> = useless.copied().collect();
@@ -361,7 +367,7 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
             results.points(),
             results.within(results.headline)
         );
-        let more = open.into_iter().chain(pictures(&little));
+        let more = open.into_iter().chain(pictures(&schemes));
         return match much.is_empty() {
             true => (under, more.collect()),
             false => (not, [under].into_iter().chain(more).collect()),
@@ -374,7 +380,6 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         true => format!("Do not release {what} under any scheme tried."),
         false => not,
     };
-    let useful = much.iter().rev().find(|leak| localizes(results, &leak.scheme)).unwrap_or(least);
     let reason = (much.len() > 1).then(|| {
         let ends = least.interval.map(|of| words::interval(of) + ", ").unwrap_or_default();
         let (percent, part) = (&least.percent, words::part(least.recovered));
@@ -384,7 +389,8 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
             least.scheme,
             results.points()
         );
-        if useful.scheme != least.scheme {
+        let useful = much.iter().rev().find(|leak| localizes(results, &leak.scheme));
+        if let Some(useful) = useful.filter(|useful| useful.scheme != least.scheme) {
             let Finding { scheme, percent, .. } = useful;
             reason.push_str(
                 ", but most cameras cannot be placed under it; of the schemes that place them, ",
@@ -393,19 +399,15 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         }
         reason + "."
     });
-    (headline, reason.into_iter().chain(open).chain(pictures(&[useful])).collect())
+    (headline, reason.into_iter().chain(open).chain(pictures(&schemes)).collect())
 }
 
-/// Returns what is seen of the scene without an attack under those schemes that release rays from two centers.
-fn pictures(leaks: &[&Finding]) -> Option<String> {
-    let rays = leaks.iter().map(|leak| leak.scheme.as_str());
-    let rays: Vec<&str> = rays.filter(|name| words::has_rays(name)).collect();
-    (!rays.is_empty()).then(|| {
-        let names = words::list(&rays);
-        format!(
-            "Without any attack, the rays of {names} show the scene from two published centers."
-        )
-    })
+/// Returns what is seen of the scene without an attack under those of the `schemes` that release rays from two centers.
+pub(crate) fn pictures(schemes: &[&str]) -> Option<String> {
+    let rays = schemes.iter().copied().filter(|name| words::has_rays(name));
+    let rays = words::list(&rays.collect::<Vec<_>>());
+    let sentence = "show the scene from two published centers";
+    (!rays.is_empty()).then(|| format!("Without any attack, the rays of {rays} {sentence}."))
 }
 
 /// Returns the cards whose schemes localize, if there are any, else all.
@@ -470,7 +472,12 @@ pub(crate) fn is_decided(results: &Results<'_>, scheme: Option<&str>) -> bool {
                 && !results.is_again()
         }
     };
-    is_best && results.document.doubts.is_empty()
+    // A doubt about another scheme begins with its name.
+    let of_others = |doubt: &String| {
+        let mut others = results.schemes.iter().filter(|name| Some(**name) != scheme);
+        scheme.is_some() && others.any(|name| doubt.starts_with(&format!("{name}: ")))
+    };
+    is_best && results.document.doubts.iter().all(of_others)
 }
 
 /// Returns which kinds of attacks on released data were not tried.

@@ -72,7 +72,7 @@ fn changed_descriptors_have_no_known_cost_without_held_out_images() {
     assert_eq!(document.localization[1].cost(), None);
     let text = page(&document, None, false);
     assert!(text.contains("No scheme with both figures keeps"), "an unknown cost is not small");
-    assert!(text.contains("olc: its descriptors are changed"));
+    assert!(text.contains("olc, whose descriptors are changed"));
     document.localization[1].held_out = Some(HeldOut {
         n_images: 10,
         right_matches: 300.0,

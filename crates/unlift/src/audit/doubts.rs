@@ -368,8 +368,8 @@ pub fn noise(row: &Row, threshold: f64) -> Option<String> {
 pub fn exchanged(row: &Row) -> Option<String> {
     let percent = row.metrics.get(EXCHANGED)?;
     Some(format!(
-        "{}: {percent:.0} % of the points come back at the other point of their line: is the truth's descriptor_row right, and do the \
-         two descriptors differ?",
+        "{}: {percent:.0} % of the points come back at the other point of their line: its two descriptors are alike, or \
+         a given truth's descriptor_row is wrong",
         row.scheme
     ))
 }
