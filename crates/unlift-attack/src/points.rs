@@ -76,19 +76,28 @@ impl<const D: usize> PointSet<D> {
 #[repr(transparent)]
 pub struct RecordId(pub u32);
 
-impl RecordId {
-    /// Returns the id as an array index.
-    #[inline(always)]
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
+/// Converts an id of rows from and to an index.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! index {
+    ($id:ident) => {
+        impl $id {
+            /// Returns the id as an array index.
+            #[inline(always)]
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
 
-    /// Creates the id of row `index`.
-    ///
-    /// # Panics
-    /// When `index` does not fit 32 bits; sizes are checked where points enter ([`crate::PointSet`]).
-    #[inline(always)]
-    pub fn from_index(index: usize) -> Self {
-        Self(u32::try_from(index).expect("sizes are checked where points enter"))
-    }
+            /// Creates the id of row `index`.
+            ///
+            /// # Panics
+            /// When `index` does not fit 32 bits; sizes are checked where points enter.
+            #[inline(always)]
+            pub fn from_index(index: usize) -> Self {
+                Self(u32::try_from(index).expect("sizes are checked where points enter"))
+            }
+        }
+    };
 }
+
+index! { RecordId }

@@ -117,11 +117,10 @@ fn status(parts: u64, of: Option<u64>, elapsed: Duration) -> String {
 
 impl unlift_audit::Progress for Progress {
     fn show(&self, done: usize, total: usize, what: &str) {
-        let length = total as u64 * PARTS;
-        if self.bar.length() != Some(length) {
-            // Another stage: what an earlier one took says nothing about it.
+        // Another total is another stage: what an earlier one took says nothing about it.
+        if self.bar.length() != Some(total as u64 * PARTS) {
             self.bar.reset();
-            self.bar.set_length(length);
+            self.bar.set_length(total as u64 * PARTS);
         }
         // Fractions that threads added may already exceed `done`.
         self.bar.set_position(self.bar.position().max(done as u64 * PARTS));

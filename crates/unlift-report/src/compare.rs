@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::attack::{self, Basis};
-use crate::document::{Document, Error, Input, Localization, Row};
+use crate::document::{ByThreshold, Document, Error, Input, Localization, Row, Spread};
 use crate::page::verdict::not_tried;
 use crate::results::{Results, distinct};
 use crate::{templates, words};
@@ -27,8 +27,7 @@ pub struct Change {
     pub new_percent: f64,
     /// The difference (new minus old) in percentage points.
     pub points: f64,
-    /// The largest difference at which this figure counts as the same: [`Comparison::tolerance_points`], or twice its own spread over
-    /// repeats if that is more.
+    /// The largest difference at which this figure counts as the same.
     pub tolerance_points: f64,
 }
 
@@ -68,8 +67,6 @@ pub struct CostsMore {
 pub struct Comparison {
     /// Largest difference, in percentage points, at which a figure counts as the same whose own spread is smaller.
     pub tolerance_points: f64,
-    /// The origin of the tolerance: `or twice a figure's own spread over repeats`, or `usual without repeats`.
-    pub tolerance_is: &'static str,
     /// Whether nothing leaks more, nothing is lost, and both audits are of the same inputs, or of inputs whose difference is accepted.
     pub passed: bool,
     /// Inputs that differ, so that a smaller figure may say nothing.
@@ -164,29 +161,15 @@ pub fn compare(
     let deviations =
         deviations.flat_map(|std| std.recovered_percent.values().chain(std.blind_percent.values()));
     let twice = |spread: f64| (200.0 * spread).ceil() / 100.0;
-    let largest = deviations.copied().reduce(f64::max);
-    let (tolerance_points, tolerance_is) = match largest {
-        Some(largest) => {
-            (twice(largest).min(USUAL_TOLERANCE), "or twice a figure's own spread over repeats")
-        }
-        None => (USUAL_TOLERANCE, "usual without repeats"),
+    let most = deviations.copied().reduce(f64::max);
+    let tolerance_points = most.map_or(USUAL_TOLERANCE, |most| twice(most).min(USUAL_TOLERANCE));
+    let tolerance = |rows: &[&Row], of: fn(&Spread) -> &ByThreshold, typed: [&str; 2]| {
+        let stds = rows.iter().filter_map(|row| row.std.as_ref());
+        let own = stds.flat_map(|std| typed.map(|typed| of(std).get(typed))).flatten();
+        own.map(|&own| twice(own)).fold(tolerance_points, f64::max)
     };
-    let spread = |row: &Row, typed: &str| {
-        let std = row.std.as_ref();
-        std.and_then(|std| std.recovered_percent.get(typed)).map_or(0.0, |&own| twice(own))
-    };
-    let of_blind = |of: &Results<'_>, scheme: &str, typed: &str| {
-        let stds = of.of_scheme(scheme).filter_map(|row| row.std.as_ref());
-        let own = stds.filter_map(|std| std.blind_percent.get(typed)).copied();
-        own.map(twice).fold(0.0, f64::max)
-    };
-    let none = |_: [&str; 2]| 0.0;
-    let changes = |of: &Unmatched,
-                   was: &dyn Fn(&str) -> Option<f64>,
-                   is: &dyn Fn(&str) -> Option<f64>,
-                   own: &dyn Fn([&str; 2]) -> f64| {
-        changes(within, of, was, is, |typed| own(typed).max(tolerance_points))
-    };
+    let of_attack =
+        |rows: &[&Row], typed: [&str; 2]| tolerance(rows, |std| &std.recovered_percent, typed);
     let mut all = Vec::new();
     // Attacks of the new audit alone, beside the strongest of the old one. They count if they recover more.
     let (mut only_new, mut new_attacks) = (Vec::new(), Vec::new());
@@ -200,13 +183,14 @@ pub fn compare(
         if let Some(at) = was.rows.iter().zip(&taken).position(is_like) {
             taken[at] = true;
             let before = |typed: &str| was.rows[at].recovered_percent.get(typed).copied();
-            let both = |[old, new]: [&str; 2]| spread(&was.rows[at], old).max(spread(row, new));
-            all.extend(changes(&of, &before, &own, &both));
+            let both = |typed: [&str; 2]| of_attack(&[&was.rows[at], row], typed);
+            all.extend(changes(within, &of, before, own, both));
             continue;
         }
         if attack::basis(row) != Basis::Oracle {
             let strongest = |typed: &str| strongest(was, &row.scheme, typed);
-            new_attacks.extend(changes(&of, &strongest, &own, &|[_, new]| spread(row, new)));
+            let tolerance = |typed: [&str; 2]| of_attack(&[row], typed);
+            new_attacks.extend(changes(within, &of, strongest, own, tolerance));
         }
         only_new.push(of);
     }
@@ -222,20 +206,20 @@ pub fn compare(
     for &scheme in &is.schemes {
         let of = |attack: &str| Unmatched { scheme: scheme.to_owned(), attack: attack.to_owned() };
         let [before, now] = [was, is].map(|of| move |typed: &str| of.blind(scheme, typed));
-        let both =
-            |[old, new]: [&str; 2]| of_blind(was, scheme, old).max(of_blind(is, scheme, new));
-        all.extend(changes(&of("blind guess"), &before, &now, &both));
+        let rows: Vec<&Row> = was.of_scheme(scheme).chain(is.of_scheme(scheme)).collect();
+        let of_blind = |typed: [&str; 2]| tolerance(&rows, |std| &std.blind_percent, typed);
+        all.extend(changes(within, &of("blind guess"), before, now, of_blind));
         let alone = of("records alone");
         let [before, now] =
             [was, is].map(|of| move |typed: &str| Some(of.records_alone(scheme, typed)?.0));
-        all.extend(changes(&alone, &before, &now, &none));
+        all.extend(changes(within, &alone, before, now, |_| tolerance_points));
         let has_alone =
             [was, is].map(|of| of.of_scheme(scheme).any(|row| row.records_alone_percent.is_some()));
         match has_alone {
             [true, false] => only_old.push(alone),
             [false, true] => {
                 let strongest = |typed: &str| strongest(was, scheme, typed);
-                new_attacks.extend(changes(&alone, &strongest, &now, &none));
+                new_attacks.extend(changes(within, &alone, strongest, now, |_| tolerance_points));
                 only_new.push(alone);
             }
             _ => {}
@@ -259,7 +243,6 @@ pub fn compare(
     let doubts = new.doubts.iter().filter(|doubt| !old_kinds.contains(&kind(doubt)));
     let mut comparison = Comparison {
         tolerance_points,
-        tolerance_is,
         passed: false,
         different: different(&old.input, &new.input).into_iter().map(differs).collect(),
         accepted,
@@ -444,11 +427,10 @@ impl Comparison {
     /// Returns the comparison in one line.
     pub fn summary(&self) -> String {
         let [more, less, same] = [&self.more, &self.less, &self.same].map(Vec::len);
-        let (points, is) = (self.tolerance_points, self.tolerance_is);
-        let point = if points == 1.0 { "point" } else { "points" };
+        let points = self.tolerance_points;
         let not = if self.is_like() { "" } else { "not like for like: " };
         let mut text = format!(
-            "{not}{} figures compared, tolerance {points} {point} ({is}): {more} leak more, {less} less, {same} as before",
+            "{not}{} figures compared, tolerance in points {points} (twice the spread of a figure, if more): {more} leak more, {less} less, {same} as before",
             more + less + same
         );
         for (n, what) in [

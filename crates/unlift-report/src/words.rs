@@ -34,11 +34,6 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     facts(scheme).map_or("", |facts| facts.rule)
 }
 
-/// Returns true if a scheme of ours releases rays from two centers.
-pub(crate) fn has_rays(scheme: &str) -> bool {
-    facts(scheme).is_some_and(|facts| matches!(facts.name, "ray" | "ray-voxel"))
-}
-
 /// Returns a percentage as a part in words: "nearly half".
 pub(crate) fn part(percent: f64) -> &'static str {
     match percent {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use unlift::descriptors::Values;
 use unlift::guard::caught;
-use unlift::neighbors::oracle::{TrueNeighbors, search};
+use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::{
@@ -50,7 +50,7 @@ fn our_sources() {
 fn solvers_keep_the_laws<const D: usize>(scheme: &Entry) {
     let (original, released, secret) = hide::<D>(scheme, &room(11, 300), 1.0, 1).unwrap();
     let near = TrueNeighbors::new(&search(&original).unwrap(), &secret, 12).unwrap();
-    let lists = near.at_inlier_ratio(0.5, 1).unwrap();
+    let lists = near.lists(0.5, &Outliers::Uniform, 1).unwrap();
     Builtin::ALL.iter().for_each(|solver| solver_laws(solver, &released, &lists));
 }
 

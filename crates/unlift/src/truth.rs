@@ -8,22 +8,7 @@ use crate::{Error, Fingerprint, PointSet};
 #[repr(transparent)]
 pub struct OriginalId(pub u32);
 
-impl OriginalId {
-    /// Returns the id as an array index.
-    #[inline(always)]
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    /// Returns the id of row `index`.
-    ///
-    /// # Panics
-    /// When `index` exceeds 32 bits. [`crate::PointSet`] checks sizes, so this does not happen.
-    #[inline(always)]
-    pub fn from_index(index: usize) -> Self {
-        Self(u32::try_from(index).expect("sizes are checked where points enter"))
-    }
-}
+unlift_attack::index! { OriginalId }
 
 /// The true points of a map. Only [`reveal`](Self::reveal) returns them, and recovery takes no argument that contains them:
 ///

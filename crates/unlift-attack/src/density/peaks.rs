@@ -6,7 +6,6 @@ use super::Peaks;
 use super::feasible::{Feasible, Hides};
 use super::spread::Spread;
 use crate::parallel;
-use crate::recover::map::LineRow;
 use crate::recover::result::Estimate;
 
 /// Samples to either side that count as the same place, about as many as smoothing reaches.
@@ -26,9 +25,13 @@ pub(super) fn find(spread: &Spread<'_>) -> Peaks {
             windows.extend(Window::all(view, span, axis, spread.grid.cell));
         }
         let pair = if slots == 2 { best_pair(windows) } else { best(windows).map(|one| [one; 2]) };
-        let total = view.iter().sum();
+        let total: f32 = view.iter().sum();
+        let blind = (2 * REACH + 1) as f32 / view.len() as f32;
         let estimate = |window: Window| {
-            peak(&window, &lines[record * per_record + window.axis], total, view.len())
+            let position = lines[record * per_record + window.axis].at(window.t);
+            let evidence = libm::logf(window.likelihood / total / blind).max(0.0);
+            let sound = evidence.is_finite() && position.iter().all(|x| x.is_finite());
+            sound.then(|| Estimate::at(position, 0, window.axis, evidence))
         };
         pair.map_or([None; 2], |pair| pair.map(estimate))
     };
@@ -94,12 +97,4 @@ impl Window {
             Self { likelihood, axis, t: (first + shift) * side }
         })
     }
-}
-
-fn peak(window: &Window, line: &LineRow<3>, total: f32, n_samples: usize) -> Option<Estimate<3>> {
-    let position = line.at(window.t);
-    let blind = (2 * REACH + 1) as f32 / n_samples as f32;
-    let evidence = libm::logf(window.likelihood / total / blind).max(0.0);
-    let sound = evidence.is_finite() && position.iter().all(|x| x.is_finite());
-    sound.then(|| Estimate::at(position, 0, window.axis, evidence))
 }

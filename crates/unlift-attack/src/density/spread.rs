@@ -269,11 +269,9 @@ impl Grid<3> {
 
 /// Returns how many leading entries have a sum of at most `most`.
 fn count_below<'a>(entries: impl Iterator<Item = &'a f64>, most: f64) -> usize {
-    let mut sum = 0.0;
-    entries
-        .take_while(|&&mass| {
-            sum += mass;
-            sum <= most
-        })
-        .count()
+    let sums = entries.scan(0.0, |sum, mass| {
+        *sum += mass;
+        Some(*sum)
+    });
+    sums.take_while(|&sum| sum <= most).count()
 }

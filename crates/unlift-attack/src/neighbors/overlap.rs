@@ -70,10 +70,10 @@ const LENGTH: f32 = 127.0;
 /// Least norm of shared cells. With a smaller one, blank parts (at the border of an image) would match each other.
 const NORM_FLOOR: f32 = 0.05;
 
-/// The versions of [`BLOCK`] patches, one after another, about 10 KB per patch. Rows beyond the last patch are zero.
+/// Each version of [`BLOCK`] patches, about 10 KB per patch. Rows beyond the last patch are zero.
 pub struct Block {
-    turned: Vec<u8>,
-    still: Vec<i8>,
+    turned: Vec<Vec<u8>>,
+    still: Vec<Vec<i8>>,
 }
 
 /// Rejects descriptors that are not SIFT: 128 columns of bytes or of floats that are not negative, with any norm.
@@ -100,24 +100,23 @@ impl Likeness for Hypotheses {
     type Block = Block;
 
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Block {
-        let (of_turned, of_still) = (starts(&self.turned), starts(&self.still));
-        let mut turned = vec![0; of_turned[self.turned.len()]];
-        let mut still = vec![0; of_still[self.still.len()]];
+        let length = |version: &Version| BLOCK * version.depth();
+        let mut turned: Vec<_> = self.turned.iter().map(|of| vec![0; length(of)]).collect();
+        let mut still: Vec<_> = self.still.iter().map(|of| vec![0; length(of)]).collect();
         let mut mixed = vec![Mixed::default(); self.cells.len()];
         for (row, &slot) in slots.iter().enumerate() {
             let squares = squares(descriptors, slot as usize);
             for (mixed, cell) in mixed.iter_mut().zip(&self.cells) {
                 *mixed = Mixed::new(&squares, cell);
             }
-            for (version, start) in self.turned.iter().zip(&of_turned) {
-                let at = start + row * version.depth();
-                let cells = turned[at..at + version.depth()].as_chunks_mut().0;
+            for (version, turned) in self.turned.iter().zip(&mut turned) {
+                let cells = turned[row * version.depth()..][..version.depth()].as_chunks_mut().0;
                 cells.iter_mut().zip(quantized(&mixed, version)).for_each(|(to, cell)| *to = cell);
             }
-            for (version, start) in self.still.iter().zip(&of_still) {
+            for (version, still) in self.still.iter().zip(&mut still) {
                 for (at, cell) in quantized(&mixed, version).enumerate() {
                     for (half, four) in cell.as_chunks::<QUAD>().0.iter().enumerate() {
-                        let first = start + packed(row, at * BINS + half * QUAD, version.depth());
+                        let first = packed(row, at * BINS + half * QUAD, version.depth());
                         still[first..first + QUAD].copy_from_slice(&four.map(|byte| byte as i8));
                     }
                 }
@@ -154,17 +153,14 @@ impl Hypotheses {
     pub fn best(&self, a: &Block, b: &Block, counts: impl Fn(usize) -> bool, scores: &mut [f32]) {
         let mut forth = vec![0i16; BLOCK * BLOCK];
         let mut back = forth.clone();
-        let (turned, still) = (starts(&self.turned), starts(&self.still));
         for pair in self.pairs.iter().filter(|pair| counts(pair.shift)) {
             let depth = self.turned[pair.turned].depth();
-            let left = turned[pair.turned]..turned[pair.turned + 1];
-            let right = still[pair.still]..still[pair.still + 1];
-            let product = |left: &[u8], right: &[i8], best: &mut [i16]| {
-                simd::raise_to_products(left, right, depth, best);
+            let product = |a: &Block, b: &Block, best: &mut [i16]| {
+                simd::raise_to_products(&a.turned[pair.turned], &b.still[pair.still], depth, best);
             };
-            product(&a.turned[left.clone()], &b.still[right.clone()], &mut forth);
+            product(a, b, &mut forth);
             if pair.both_ways {
-                product(&b.turned[left], &a.still[right], &mut back);
+                product(b, a, &mut back);
             }
         }
         // Squares that fit the cache, as `back` is read across its rows.
@@ -178,15 +174,6 @@ impl Hypotheses {
             }
         }
     }
-}
-
-/// Returns the start of each version within a block, and the length of the block.
-fn starts(versions: &[Version]) -> Vec<usize> {
-    let mut starts = vec![0];
-    for version in versions {
-        starts.push(starts[starts.len() - 1] + BLOCK * version.depth());
-    }
-    starts
 }
 
 /// Returns the gradient histogram behind a RootSIFT descriptor: the squares of its values, with sum 1.

@@ -226,7 +226,7 @@ fn joint<const D: usize, F: Family<D>>(
     let mut estimates = restore(start);
     // All slots together: each by its neighbors' estimates. From rays that say hardly more than chance, neighbors add nothing.
     for _ in 0..if known.is_empty() { 1 } else { ROUNDS } {
-        if family.anchored().is_none() || mean_evidence(&estimates) >= LEAST_EVIDENCE {
+        if family.anchored().is_none() || Estimate::mean_evidence(&estimates) >= LEAST_EVIDENCE {
             estimates = restore(joint::recover(problem, estimates));
         }
     }
@@ -246,9 +246,4 @@ fn joint<const D: usize, F: Family<D>>(
         None if with_beliefs => beliefs::recover(problem, estimates),
         None => estimates,
     })
-}
-
-fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {
-    let sum: f64 = estimates.iter().map(|e| f64::from(e.evidence)).sum();
-    sum / estimates.len().max(1) as f64
 }

@@ -3,10 +3,13 @@
 //! Consensus solves a sample of slots for a geometric ladder of deltas. The score of a delta is the mean evidence minus that with mixed
 //! lists, made of other slots' entries, which contains the effect of uneven density, too.
 
+use std::collections::BTreeSet;
+
 use crate::geometry::frame::Bounds;
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
 use crate::recover::map::{CHUNK, Family, mixed, trimmed_box};
+use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
@@ -107,8 +110,7 @@ fn choose<const D: usize, F: Family<D>>(
     let slots = sample(lists.n_slots(), F::DELTA_CHUNKS, seed);
     let mixed = mixed(lists, &slots, slots_per_record);
     let mean_evidence = |lists: &Neighborhoods, delta: f64| {
-        let solved = consensus::solve(family, lists, delta as f32, &slots);
-        solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
+        Estimate::mean_evidence(&consensus::solve(family, lists, delta as f32, &slots))
     };
     let value = |delta: f64| mean_evidence(lists, delta) - mean_evidence(&mixed, delta);
     // From large to small: far below the maximum, smaller deltas only lose more neighbors.
@@ -167,12 +169,10 @@ fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
 fn sample(n_slots: usize, n_chunks: usize, seed: u64) -> Vec<usize> {
     let all = n_slots.div_ceil(CHUNK);
     let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);
-    let mut chunks: Vec<usize> = match all <= n_chunks {
+    let chunks: BTreeSet<usize> = match all <= n_chunks {
         true => (0..all).collect(),
         false => (0..n_chunks).map(|_| draws.below(all as u64) as usize).collect(),
     };
-    chunks.sort_unstable();
-    chunks.dedup();
     let slots = |chunk: usize| chunk * CHUNK..n_slots.min((chunk + 1) * CHUNK);
     chunks.into_iter().flat_map(slots).collect()
 }

@@ -4,7 +4,7 @@ use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::parallel;
 use crate::recover::map::{distance2, rows_of};
-use crate::recover::result::{Estimate, Recovered, Status, Unknown, stored_support};
+use crate::recover::result::{Estimate, Recovered, Status, Unknown};
 use crate::released::Released;
 use crate::{Error, RowOrder};
 
@@ -23,20 +23,22 @@ pub(super) fn place_unlisted<const D: usize>(
         return;
     };
     for slot in lost {
-        let own = slot..slot + 1;
         let (own, other) = match released.slots_per_record() {
             2 if estimates[slot ^ 1].is_known() => (slot & !1..(slot | 1) + 1, slot ^ 1),
-            _ => (own, slot),
+            _ => (slot..slot + 1, slot),
         };
         let from = estimates[other].position;
-        let peaks = own.filter_map(|at| *peaks.of.get(at)?).map(|peak| {
-            let position: [f32; D] = std::array::from_fn(|c| peak.position[c % 3]);
-            Estimate::at(position, 0, peak.axis.into(), peak.evidence)
-        });
-        let farthest = peaks
-            .max_by(|a, b| distance2(&a.position, &from).total_cmp(&distance2(&b.position, &from)));
+        let away = |peak: &Estimate<D>| distance2(&peak.position, &from);
+        let own = own.filter_map(|slot| peak(&peaks, slot));
+        let farthest = own.max_by(|a, b| away(a).total_cmp(&away(b)));
         estimates[slot] = farthest.unwrap_or(estimates[slot]);
     }
+}
+
+/// Returns the estimate at the peak of `slot`, if it has one. There are peaks in three dimensions only.
+fn peak<const D: usize>(peaks: &Peaks, slot: usize) -> Option<Estimate<D>> {
+    let Estimate { position, axis, evidence, .. } = peaks.of.get(slot).copied().flatten()?;
+    Some(Estimate::at(std::array::from_fn(|c| position[c % 3]), 0, axis.into(), evidence))
 }
 
 /// Returns the points at `peaks`.
@@ -50,15 +52,10 @@ pub(super) fn at_peaks<const D: usize>(
     let rows = rows_of(released, None);
     // Delta is the resolution of the peaks.
     let delta = if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 };
-    let peak = |slot: usize| match peaks.of.get(slot).copied().flatten() {
-        // These attacks return positions in three dimensions only.
-        Some(Estimate { position, axis, evidence, .. }) => {
-            Estimate::at(std::array::from_fn(|c| position[c % 3]), 0, axis.into(), evidence)
-        }
-        None => Estimate::lost(Status::NoSupport),
-    };
+    let peak = |slot: usize| peak(peaks, slot).unwrap_or(Estimate::lost(Status::NoSupport));
+    // Only lines and rays have rows.
     let distances = |slot: usize, x: [f32; D]| {
-        let rows = lists.of(slot).iter().map(|record| &rows[record.index()]);
+        let rows = lists.of(slot).iter().filter_map(|record| rows.get(record.index()));
         rows.map(move |row| row.distance2(&x, row.along(&x)).sqrt())
     };
     let cost = |at: usize, slot: usize| distances(slot, peak(at).position).sum::<f32>();
@@ -66,12 +63,9 @@ pub(super) fn at_peaks<const D: usize>(
         let (a, b) = (slot & !1, slot | 1);
         let is_crossed =
             released.slots_per_record() == 2 && cost(a, a) + cost(b, b) > cost(b, a) + cost(a, b);
-        let mut estimate = peak(if is_crossed { slot ^ 1 } else { slot });
-        if !rows.is_empty() {
-            let near = distances(slot, estimate.position).filter(|&d| d <= delta as f32);
-            estimate.support = stored_support(near.count() as u32);
-        }
-        estimate
+        let estimate = peak(if is_crossed { slot ^ 1 } else { slot });
+        let near = distances(slot, estimate.position).filter(|&d| d <= delta as f32);
+        Estimate { support: u16::try_from(near.count()).unwrap_or(u16::MAX), ..estimate }
     };
     let estimates = parallel::map(released.n_slots(), place);
     let recovered = Recovered::new(released, lists, &estimates, delta)?;

@@ -219,12 +219,7 @@ const NOTHING: (Term, f32) =
 impl<const D: usize> Terms<D> {
     /// Returns the log-likelihoods of the places `from + t * direction` at some `t`. `from` is relative to the center.
     #[inline(always)]
-    fn scores(
-        &mut self,
-        from: &[f32; D],
-        (direction, length2): (&[f32; D], f32),
-        t: &Lanes,
-    ) -> Lanes {
+    fn scores(&mut self, from: &[f32; D], direction: &[f32; D], t: &Lanes) -> Lanes {
         let n = self.terms.len();
         self.aimed.resize(n, [0.0; 2]);
         let (away, aimed) = (self.away.first(n), &mut self.aimed[..n]);
@@ -237,6 +232,7 @@ impl<const D: usize> Terms<D> {
             }
             aimed[i] = [s, 2.0 * a];
         }
+        let length2 = distance2(direction, &[0.0; D]);
         let t2: Lanes = t.map(|t| t * t * length2);
         let radius2 = self.radius * self.radius;
         let mut counts = [0u32; LANES];
@@ -352,7 +348,7 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             (0..D).map(|c| (places[w][c] - from[c]) * direction[c]).sum::<f32>() / length2
         });
         let relative = std::array::from_fn(|c| from[c] - center[c]);
-        let scores = terms.scores(&relative, (&direction, length2), &t);
+        let scores = terms.scores(&relative, &direction, &t);
         for w in 0..LANES {
             if scores[w] > best.score {
                 let x = if steps[w] == 0.0 { from } else { places[w] };

@@ -45,11 +45,6 @@ pub struct Estimate<const D: usize> {
     pub evidence: f32,
 }
 
-/// Converts a count to the type in which it is stored.
-pub(crate) fn stored_support(count: u32) -> u16 {
-    u16::try_from(count).unwrap_or(u16::MAX)
-}
-
 impl<const D: usize> Estimate<D> {
     #[inline(always)]
     pub(crate) fn is_known(&self) -> bool {
@@ -58,8 +53,14 @@ impl<const D: usize> Estimate<D> {
 
     /// Creates the estimate of a slot that was recovered.
     pub(crate) fn at(position: [f32; D], support: u32, axis: usize, evidence: f32) -> Self {
-        let (status, support, axis) = (Status::Ok, stored_support(support), axis as u8);
-        Self { position, status, support, axis, evidence }
+        let support = u16::try_from(support).unwrap_or(u16::MAX);
+        Self { position, status: Status::Ok, support, axis: axis as u8, evidence }
+    }
+
+    /// Returns the mean evidence of `estimates`, in nats; 0 without any.
+    pub(crate) fn mean_evidence(estimates: &[Self]) -> f64 {
+        let sum: f64 = estimates.iter().map(|e| f64::from(e.evidence)).sum();
+        sum / estimates.len().max(1) as f64
     }
 
     /// Creates the estimate of a slot that was not recovered.

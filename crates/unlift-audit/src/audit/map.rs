@@ -77,8 +77,7 @@ impl Map<'_> {
         tried.localizes = localize.is_some() && !prepared.cameras.views.is_empty();
         let mut remarks = audit.remarks.clone();
         if release.is_some() && plan.repeats > 1 {
-            let note = "repeats: the records of the file stay the same; for their randomness, write and audit several files";
-            remarks.notes.push(note.to_owned());
+            remarks.notes.push("repeats: the records of the file stay the same; for their randomness, write and audit several files".to_owned());
         }
         check_gates(&audit.gates, &tried, Some(points))?;
         remarks.doubts.iter().chain(&remarks.notes).for_each(|note| progress.note(note));

@@ -237,8 +237,7 @@ pub fn prepare<'a>(
     }
     if preparation.even && rows.len() % 2 == 1 {
         rows.pop();
-        let note = "1 point is left out, so that schemes that pair points hide the same ones as all others";
-        remarks.notes.push(note.to_owned());
+        remarks.notes.push("1 point is left out, so that schemes that pair points hide the same ones as all others".to_owned());
     }
     let k = preparation.k;
     if rows.len() <= k {
@@ -356,6 +355,8 @@ mod tests {
             let points = prepared.original.reveal();
             assert_eq!((prepared.unit_in_map_units, points.unit()), (in_map_units, unit));
             assert_eq!(points.positions()[3], [third, 0.0, 0.0]);
+            let even = prepare(line(9), None, &Preparation { scale, even: true, ..PLAIN }).unwrap();
+            assert_eq!((even.rows, even.remarks.notes.len()), ((0..8).collect(), 1));
         }
         let coincide = "median distance to neighbor 2: expected more than 0 (points that do not coincide), found 0";
         for (points, expected) in [
@@ -363,16 +364,6 @@ mod tests {
             (vec![[1.0; 3]; 5], coincide),
         ] {
             assert_eq!(prepare(points, None, &PLAIN).unwrap_err().to_string(), expected);
-        }
-    }
-
-    #[test]
-    fn of_an_odd_number_the_last_point_is_left_out() {
-        let even = Preparation { even: true, ..PLAIN };
-        for (n, kept) in [(9, 8), (8, 8)] {
-            let prepared = prepare(line(n), None, &even).unwrap();
-            assert_eq!(prepared.rows, (0..kept).collect::<Vec<u32>>());
-            assert_eq!(prepared.remarks.notes.len(), n - kept as usize);
         }
     }
 

@@ -101,9 +101,8 @@ fn points(args: &ExportArgs) -> crate::Result<Points> {
         }
         Stage::Neighborhoods | Stage::PointNeighborhoods => return wrong("neighborhoods"),
     };
-    let options = [("--scale", args.scale.is_some()), ("--cameras", args.cameras.is_some())];
-    let option = options.into_iter().find(|(_, given)| *given && unit != Unit::Meter);
-    if let Some((option, _)) = option {
+    if unit != Unit::Meter && (args.scale.is_some() || args.cameras.is_some()) {
+        let option = if args.scale.is_some() { "--scale" } else { "--cameras" };
         let (path, unit) = (path.display(), unit.name());
         bail!("{option}: expected a file in meters (obfuscate --scale), found {path} in {unit}");
     }

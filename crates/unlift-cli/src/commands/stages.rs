@@ -96,10 +96,8 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
     let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
         return obfuscate_images(args, out);
     };
-    let audit = args.audit.as_deref();
-    let audit =
-        audit.map(|path| Ok::<_, crate::Error>((path, read_document(path)?))).transpose()?;
-    let even = audit.as_ref().is_some_and(|(_, audit)| audit.input.n_points.is_multiple_of(2));
+    let audit = args.audit.as_deref().map(read_document).transpose()?;
+    let even = audit.as_ref().is_some_and(|audit| audit.input.n_points.is_multiple_of(2));
     let prepared = open_map(&args.path, map, (even, false), (args.seed.unwrap_or(0), false))?;
     prepared.remarks.doubts.iter().chain(&prepared.remarks.notes).for_each(output::note);
     let public = |kind| public(args.public_descriptors.as_deref(), kind);
@@ -111,7 +109,7 @@ pub fn obfuscate(args: &ObfuscateArgs) -> crate::Result<()> {
         None => scheme,
     };
     let name = scheme.name();
-    let leak = match audit {
+    let leak = match args.audit.as_ref().zip(audit) {
         Some((path, audit)) => {
             let public = public_name(args.public_descriptors.as_deref());
             let public = args.protect_descriptors.as_ref().map(|_| public);

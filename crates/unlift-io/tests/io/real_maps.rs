@@ -62,7 +62,7 @@ fn what_is_said_about_a_real_map_comes_true() {
                 obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
             let near = oracle::TrueNeighbors::new(&search, &secret, 50).unwrap();
             for ratio in [0.5, 0.1] {
-                let lists = near.at_inlier_ratio(ratio, 0).unwrap();
+                let lists = near.lists(ratio, &oracle::Outliers::Uniform, 0).unwrap();
                 let options = RecoverOptions::default();
                 let recovered = recover(&released, &lists, &Builtin::Joint, &options).unwrap();
                 let accuracy = evaluate(&recovered, &original, &secret).unwrap();

@@ -72,8 +72,7 @@ fn by_scheme(results: &Results<'_>, cards: &[Card]) -> String {
         ));
     }
     if results.rows.iter().any(|row| row.std.is_some()) {
-        let least = SPREAD_THAT_COUNTS;
-        text.push_str(&format!("±: standard deviation over seeds, shown above {least}\n"));
+        text += &format!("±: standard deviation over seeds, shown above {SPREAD_THAT_COUNTS}\n");
     }
     text.push_str(&cost::text(results));
     for NotAudited { scheme, neighbors, reason, .. } in &results.document.not_audited {

@@ -220,9 +220,7 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
         label("scheme", |of: &Of| of.scheme.clone()),
         label("protects", protects),
         figure("come back, % of released", move |of: &Of| percent(leak(results, of))),
-        figure("% of all points", move |of: &Of| {
-            percent(leak(results, of).map(|leak| leak * released(results, of)))
-        }),
+        figure("% of all points", move |of: &Of| percent(leak_of_all(results, of))),
         figure("bound: times unprotected", move |of: &Of| number(bound(of, of.multiple))),
         figure("camera center", move |of: &Of| length(bound(of, of.center_error))),
         figure("rotation, degrees", move |of: &Of| number(bound(of, of.rotation_error_degrees))),
@@ -250,12 +248,11 @@ pub(crate) fn table(results: &Results<'_>) -> Option<Table> {
     Some(Table::of("cost", caption, localization, columns))
 }
 
-/// Returns the fraction of all points that is released.
-fn released(results: &Results<'_>, of: &Localization) -> f64 {
-    results.of_scheme(&of.scheme).next().map_or(1.0, |row| {
-        let dropped: usize = row.dropped.values().sum();
-        row.n_points as f64 / (row.n_points + dropped).max(1) as f64
-    })
+/// Returns the leak in percent of all points, of which a scheme may release a part.
+fn leak_of_all(results: &Results<'_>, of: &Localization) -> Option<f64> {
+    let (row, leak) = (results.of_scheme(&of.scheme).next()?, leak(results, of)?);
+    let dropped: usize = row.dropped.values().sum();
+    Some(leak * row.n_points as f64 / (row.n_points + dropped).max(1) as f64)
 }
 
 /// Returns a value of the bound, which says nothing about changed descriptors.
@@ -291,14 +288,11 @@ pub(crate) fn text(results: &Results<'_>) -> String {
             percent(bound(of, Some(of.failed_percent)).filter(|_| of.measured().is_none()))
         }),
     ];
-    let leaves_out = localization.iter().any(|of| released(results, of) < 0.9);
+    let of_all = |of: &Localization| leak_of_all(results, of);
+    let leaves_out =
+        localization.iter().any(|of| of_all(of) < leak(results, of).map(|of| 0.9 * of));
     if leaves_out {
-        columns.insert(
-            2,
-            figure("of all points", |of: &Localization| {
-                percent(leak(results, of).map(|leak| leak * released(results, of)))
-            }),
-        );
+        columns.insert(2, figure("of all points", move |of: &Localization| percent(of_all(of))));
     }
     let of_map = localization.iter().filter(|of| !of.of_queries);
     let table = Table::of("cost", "", of_map, columns).text();

@@ -314,9 +314,6 @@ pub(crate) fn banner(results: &Results<'_>, cards: &[Card]) -> Banner {
     Banner { level, headline, sentence: sentences.join(" "), every, unknown }
 }
 
-/// Schemes that the headline names if there are more.
-const MAX_NAMED: usize = 7;
-
 /// Returns whether to release, by what came back from the released data alone, and the reasons. A small leak decides nothing
 /// before the best attack by descriptors was tried, or if figures are doubtful.
 fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
@@ -330,19 +327,11 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
     }
     let schemes: Vec<&str> = cards.iter().map(|card| &*card.scheme).collect();
     much.sort_by(|a, b| b.recovered.total_cmp(&a.recovered));
-    fn schemes_of<'f>(leaks: &[&'f Finding]) -> Vec<&'f str> {
-        leaks.iter().map(|leak| leak.scheme.as_str()).collect()
-    }
-    let names = |leaks: &[&Finding]| words::list(&schemes_of(leaks));
-    let what = results.subject();
-    let under = match &much[..] {
-        [first @ .., _] if first.len() >= MAX_NAMED => {
-            let more = format!("{} more of the schemes tried", much.len() - MAX_NAMED);
-            words::list(&[&schemes_of(&much[..MAX_NAMED])[..], &[&more]].concat())
-        }
-        few => names(few),
+    let names = |leaks: &[&Finding]| {
+        words::list(&leaks.iter().map(|leak| leak.scheme.as_str()).collect::<Vec<_>>())
     };
-    let not = format!("Do not release {what} under {under}.");
+    let what = results.subject();
+    let not = format!("Do not release {what} under {}.", names(&much));
     let undecided = words::list(&undecided);
     let why = match results.document.doubts.is_empty() {
         true => "the best attack by descriptors was not tried",
@@ -391,11 +380,9 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
         );
         let useful = much.iter().rev().find(|leak| localizes(results, &leak.scheme));
         if let Some(useful) = useful.filter(|useful| useful.scheme != least.scheme) {
-            let Finding { scheme, percent, .. } = useful;
-            reason.push_str(
-                ", but most cameras cannot be placed under it; of the schemes that place them, ",
-            );
-            reason.push_str(&format!("{scheme} leaks least, {percent} %"));
+            reason +=
+                ", but most cameras cannot be placed under it; of the schemes that place them, ";
+            reason += &format!("{} leaks least, {} %", useful.scheme, useful.percent);
         }
         reason + "."
     });
@@ -404,10 +391,11 @@ fn decision(results: &Results<'_>, cards: &[Card]) -> (String, Vec<String>) {
 
 /// Returns what is seen of the scene without an attack under those of the `schemes` that release rays from two centers.
 pub(crate) fn pictures(schemes: &[&str]) -> Option<String> {
-    let rays = schemes.iter().copied().filter(|name| words::has_rays(name));
-    let rays = words::list(&rays.collect::<Vec<_>>());
-    let sentence = "show the scene from two published centers";
-    (!rays.is_empty()).then(|| format!("Without any attack, the rays of {rays} {sentence}."))
+    let has_rays =
+        |name: &&str| words::facts(name).is_some_and(|of| ["ray", "ray-voxel"].contains(&of.name));
+    let rays: Vec<&str> = schemes.iter().copied().filter(has_rays).collect();
+    let sentence = "show the scene from two published centers, without any attack.";
+    (!rays.is_empty()).then(|| format!("The rays of {} {sentence}", words::list(&rays)))
 }
 
 /// Returns the cards whose schemes localize, if there are any, else all.

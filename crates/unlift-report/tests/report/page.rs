@@ -54,7 +54,7 @@ fn the_verdict_names_the_strongest_attack_of_every_scheme() {
     let of_lists = [
         "Do not release this map under olc, ray and ray-voxel. Not tried: attacks by descriptors and the strongest solver (--solver joint). The least leak of these, 20.8 % \
          (ray-voxel), is a fifth or more of the points. Nothing is decided about cp, ppl, ppl+ and plane, as the best attack by descriptors was not tried. \
-         Without any attack, the rays of ray and ray-voxel show the scene from two published centers. The strongest attack tried recovers 58.6 % of the points of this map within \
+         The rays of ray and ray-voxel show the scene from two published centers, without any attack. The strongest attack tried recovers 58.6 % of the points of this map within \
          10 cm today, from the released data alone (olc, records alone). If half of the neighbors were known, every scheme \
          tried would give back 83.3 % or more.",
         "olc Random lines Today, from the released data alone 58.6 % records alone (tomography) If half of the \

@@ -92,14 +92,6 @@ impl TrueNeighbors {
         Ok(keep)
     }
 
-    /// Makes [`lists`](Self::lists) with uniformly random outliers.
-    ///
-    /// # Errors
-    /// Returns the errors of [`lists`](Self::lists).
-    pub fn at_inlier_ratio(&self, inlier_ratio: f64, seed: u64) -> Result<Neighborhoods, Error> {
-        self.lists(inlier_ratio, &Outliers::Uniform, seed)
-    }
-
     /// Returns the true neighbors of `slot`, nearest first.
     fn of(&self, slot: usize) -> &[RecordId] {
         &self.records[slot * self.k..(slot + 1) * self.k]

@@ -107,8 +107,8 @@ fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
             }
         }
         let (mut place, mut right, near) = (Vec::new(), Vec::new(), hidden.near(10));
-        let lists = near.at_inlier_ratio(0.5, key).unwrap();
-        let true_lists = near.at_inlier_ratio(1.0, key).unwrap();
+        let lists = near.lists(0.5, &Outliers::Uniform, key).unwrap();
+        let true_lists = near.lists(1.0, &Outliers::Uniform, key).unwrap();
         for slot in 0..lists.n_slots() {
             for (at, record) in lists.of(slot).iter().enumerate() {
                 place.push(at as f64);

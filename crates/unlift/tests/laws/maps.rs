@@ -90,7 +90,7 @@ impl<const D: usize> Hidden<D> {
 
     /// Returns lists of the oracle.
     pub fn lists(&self, k: usize, inlier_ratio: f64, seed: u64) -> Neighborhoods {
-        self.near(k).at_inlier_ratio(inlier_ratio, seed).unwrap()
+        self.near(k).lists(inlier_ratio, &Outliers::Uniform, seed).unwrap()
     }
 
     /// Returns lists of the oracle with outliers of a noise model.

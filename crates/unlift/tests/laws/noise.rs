@@ -35,7 +35,7 @@ fn rank_from(of: &Hidden<3>, slot: usize) -> impl Fn(&RecordId) -> usize {
 fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
     for hidden in SCHEMES.map(hidden) {
         let near = hidden.near(K);
-        let full = near.at_inlier_ratio(1.0, 3).unwrap();
+        let full = near.lists(1.0, &Outliers::Uniform, 3).unwrap();
         let split = |lists: &Neighborhoods, slot: usize| -> [BTreeSet<RecordId>; 2] {
             lists.of(slot).iter().partition(|&r| full.of(slot).contains(r)).into()
         };
@@ -43,7 +43,7 @@ fn every_model_keeps_the_share_the_same_true_neighbors_and_outliers() {
             let mut higher = None;
             for ratio in [0.6, 0.5, 0.3, 0.2, 0.0] {
                 let lists = hidden.noisy_lists(K, (noise, ratio), 3).unwrap();
-                let uniform = near.at_inlier_ratio(ratio, 3).unwrap();
+                let uniform = near.lists(ratio, &Outliers::Uniform, 3).unwrap();
                 assert_eq!(near.measured_inlier_ratio(&lists), ratio, "{noise:?}");
                 for slot in 0..lists.n_slots() {
                     assert_eq!(lists.of(slot).len(), K);

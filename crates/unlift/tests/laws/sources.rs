@@ -257,7 +257,8 @@ fn near(k: usize) -> TrueNeighbors {
 #[test]
 fn a_ratio_above_zero_is_not_zero() {
     let near = near(4);
-    let measured = |ratio| near.measured_inlier_ratio(&near.at_inlier_ratio(ratio, 1).unwrap());
+    let measured =
+        |ratio| near.measured_inlier_ratio(&near.lists(ratio, &Outliers::Uniform, 1).unwrap());
     assert_eq!([0.0, 0.05, 0.1, 0.25, 0.5].map(measured), [0.0, 0.25, 0.25, 0.25, 0.5]);
 }
 
@@ -265,7 +266,7 @@ fn a_ratio_above_zero_is_not_zero() {
 #[test]
 fn the_ratio_of_lists_in_either_order_is_that_of_the_better_one() {
     let near = near(9);
-    let lists = near.at_inlier_ratio(1.0, 1).unwrap();
+    let lists = near.lists(1.0, &Outliers::Uniform, 1).unwrap();
     let row = |slot: usize| lists.of(slot ^ 1).iter().map(|record| record.0).collect();
     let rows: Vec<_> = (0..lists.n_slots()).map(row).collect();
     let turned = lists_of(&rows, lists.n_slots() / 2, 2);

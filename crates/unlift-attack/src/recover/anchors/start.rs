@@ -6,7 +6,7 @@
 
 use crate::neighbors::Neighborhoods;
 use crate::parallel;
-use crate::recover::map::{LineRow, evenly, evidence, mixed};
+use crate::recover::map::{LineRow, evenly, evidence, mixed, sorted};
 use crate::recover::result::{Estimate, Status};
 
 /// Only evidence beyond this many times the mean by chance counts, because half of the slots exceed the mean.
@@ -120,9 +120,7 @@ fn window<const D: usize>(
     let own = &rows[slot];
     let listed = lists.of(slot);
     let others = listed.iter().map(|record| &rows[record.index()]);
-    let mut sines: Vec<f32> =
-        others.filter(|row| row.group == own.group).map(|row| sine(own, row)).collect();
-    sines.sort_unstable_by(f32::total_cmp);
+    let sines = sorted(others.filter(|row| row.group == own.group).map(|row| sine(own, row)));
     // A window must be wide enough for a few bearings of the map.
     let finest = 4.0 / rows.len().max(4) as f32;
     let mut best: Option<Window> = None;

@@ -36,15 +36,11 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Option<Peaks>
     let k = limit.min((COARSE * lines.len() as f64) as usize).max(2);
     let place = |row: usize| {
         let own = &lines[row];
-        // Rays of the own center do not vote.
-        let votes = |line: &LineRow<3>| !own.is_ray() || line.group != own.group;
-        let miss2 = |line| if votes(line) { section(own, line).1 } else { f32::NAN };
-        let misses = lines.iter().step_by(every).map(miss2);
-        let (near, reach) = nearest(misses.collect(), k, (lines, row), every);
-        let mut votes = passes(&lines[row], near.iter().map(|&at| &lines[at]));
+        let (near, reach) = nearest(k, (lines, row), every, |_, line| section(own, line).1);
+        let mut votes = passes(own, near.iter().map(|&at| &lines[at]));
         let one = |votes: &mut [f64]| mode(votes).map(|t| [t; 2]);
         let modes = if is_paired { two_modes(&mut votes) } else { one(&mut votes) };
-        (modes.map_or([None; 2], |modes| modes.map(|t| on(&lines[row], t))), reach)
+        (modes.map_or([None; 2], |modes| modes.map(|t| on(own, t))), reach)
     };
     let rows: Vec<([Option<Estimate<3>>; 2], f32)> = parallel::map(lines.len(), place);
     let reaches = rows.iter().map(|row| f64::from(row.1));
@@ -70,13 +66,13 @@ fn refine(
     let distance2 = |line: &LineRow<3>, x: [f32; 3]| line.distance2(&x, line.along(&x));
     let step = |row: usize| {
         let estimate = estimates[row]?;
-        let points = estimates.iter().step_by(every);
-        let from_own =
-            points.map(|p| distance2(&lines[row], p.map_or([f32::NAN; 3], |p| p.position)));
-        let (near, _) = nearest(from_own.collect(), REFINE, (lines, row), every);
-        let to_estimate =
-            lines.iter().step_by(every).map(|line| distance2(line, estimate.position));
-        let (mut passing, _) = nearest(to_estimate.collect(), REFINE, (lines, row), every);
+        let nearest = |squared: &dyn Fn(usize, &LineRow<3>) -> f32| {
+            nearest(REFINE, (lines, row), every, squared).0
+        };
+        let near = nearest(&|at, _| {
+            estimates[at].map_or(f32::NAN, |other| distance2(&lines[row], other.position))
+        });
+        let mut passing = nearest(&|_, line| distance2(line, estimate.position));
         passing.sort_unstable();
         let passes_too = |at: &usize| passing.binary_search(at).is_ok();
         let both: Vec<usize> = near.iter().copied().filter(passes_too).collect();
@@ -99,20 +95,21 @@ fn section(line: &LineRow<3>, passing: &LineRow<3>) -> (f32, f32, f32) {
     LineRow { group: NO_GROUP, ..*line }.section(passing)
 }
 
-/// Returns the `k` voting lines with the smallest finite distances, and the largest of these. `squared` has that of every `every`-th line.
+/// Returns the `k` voting lines with the smallest finite distances, and the largest of these. `squared` returns the squared distance of a
+/// line. Every `every`-th line votes, but no ray of the own center.
 fn nearest(
-    squared: Vec<f32>,
     k: usize,
     (lines, row): (&[LineRow<3>], usize),
     every: usize,
+    squared: impl Fn(usize, &LineRow<3>) -> f32,
 ) -> (Vec<usize>, f32) {
-    let own = &lines[row];
-    let votes = |at: usize| if own.is_ray() { lines[at].group != own.group } else { at != row };
-    let voting = squared.into_iter().enumerate().map(|(number, d)| (number * every, d));
-    let voting = voting.filter(|&(at, d)| d.is_finite() && votes(at));
-    // Distances are not negative, so their bits sort as they do.
-    let mut keys: Vec<u64> =
-        voting.map(|(at, d)| u64::from(d.to_bits()) << 32 | at as u64).collect();
+    let key = |(at, line): (usize, &LineRow<3>)| {
+        let votes = at != row && line.may_vote_for(&lines[row]);
+        let distance = Some(squared(at, line)).filter(|d| votes && d.is_finite())?;
+        // Distances are not negative, so their bits sort as they do.
+        Some(u64::from(distance.to_bits()) << 32 | at as u64)
+    };
+    let mut keys: Vec<u64> = lines.iter().enumerate().step_by(every).filter_map(key).collect();
     if keys.len() > k {
         keys.select_nth_unstable(k - 1);
         keys.truncate(k);

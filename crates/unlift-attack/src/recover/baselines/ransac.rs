@@ -169,17 +169,40 @@ impl<const D: usize> Trials<D> for LineFamily<D> {
     #[inline(always)]
     fn sample(&self, task: Task<'_>, scratch: &mut Scratch<D>) -> Solved<[f32; D]> {
         let own = self.own(task.slot);
-        scratch.lines.gather(&self.rows, task.listed);
-        scratch.lines.sections(own, &mut scratch.sections);
-        let may_vote = scratch.lines.n_that_may_vote(own);
+        let Scratch { lines, sections, .. } = scratch;
+        let may_vote = lines.sections(&self.rows, task.listed, own, sections);
         let (solved, trials) = on_line(task, may_vote, scratch);
         (solved.map(|(t, support)| (own.at(own.clamp(t)), support)), trials)
     }
 }
 
 impl<const D: usize> Trials<D> for CandidateFamily<'_, D> {
+    /// Returns the axes by majority vote over all neighborhoods that contain a record (supplement A).
+    ///
+    /// In a neighborhood (a slot's record and its list), each member votes for the axis with the largest sum of distances to the others.
+    /// Sums are divided by their mean: otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
     fn axes(&self, lists: &Neighborhoods) -> Vec<u8> {
-        vote(self.rows, lists)
+        let rows = self.rows;
+        let votes: Vec<AtomicU32> = (0..D * rows.len()).map(|_| AtomicU32::new(0)).collect();
+        parallel::for_each(lists.n_slots(), &|slot| {
+            let mut members = vec![RecordId::from_index(slot)];
+            members.extend_from_slice(lists.of(slot));
+            // Per axis, the sum of the distances of each member to the others, divided by the mean of these sums.
+            let distances: [Vec<f32>; D] = std::array::from_fn(|axis| {
+                let values: Vec<f32> =
+                    members.iter().map(|member| rows[member.index()][axis]).collect();
+                let sum = |own: &f32| values.iter().map(|x| (own - x).abs()).sum::<f32>();
+                let sums: Vec<f32> = values.iter().map(sum).collect();
+                let mean = sums.iter().sum::<f32>() / sums.len() as f32;
+                if mean > 0.0 { sums.iter().map(|sum| sum / mean).collect() } else { sums }
+            });
+            for (at, member) in members.iter().enumerate() {
+                let guess = largest::<D>(|axis| distances[axis][at]);
+                votes[D * member.index() + usize::from(guess)].fetch_add(1, Ordering::Relaxed);
+            }
+        });
+        let of = |of: &[AtomicU32]| largest::<D>(|axis| of[axis].load(Ordering::Relaxed) as f32);
+        votes.chunks_exact(D).map(of).collect()
     }
 
     #[inline(always)]
@@ -243,35 +266,6 @@ impl<const D: usize> Trials<D> for PlaneFamily<'_, D> {
         }
         (Ok((place, support)), trials)
     }
-}
-
-// The exchanged coordinate of permuted points (supplement A).
-
-/// Returns the exchanged axis of every record, by majority vote over all neighborhoods that contain it.
-///
-/// In a neighborhood (a slot's record and its list), each member votes for the axis with the largest sum of distances to the others. Sums
-/// are divided by their mean: otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
-fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
-    let votes: Vec<AtomicU32> = (0..D * rows.len()).map(|_| AtomicU32::new(0)).collect();
-    parallel::for_each(lists.n_slots(), &|slot| {
-        let mut members = vec![RecordId::from_index(slot)];
-        members.extend_from_slice(lists.of(slot));
-        // Per axis, the sum of the distances of each member to the others, divided by the mean of these sums.
-        let distances: [Vec<f32>; D] = std::array::from_fn(|axis| {
-            let values: Vec<f32> =
-                members.iter().map(|member| rows[member.index()][axis]).collect();
-            let sum = |own: &f32| values.iter().map(|x| (own - x).abs()).sum::<f32>();
-            let sums: Vec<f32> = values.iter().map(sum).collect();
-            let mean = sums.iter().sum::<f32>() / sums.len() as f32;
-            if mean > 0.0 { sums.iter().map(|sum| sum / mean).collect() } else { sums }
-        });
-        for (at, member) in members.iter().enumerate() {
-            let guess = largest::<D>(|axis| distances[axis][at]);
-            votes[D * member.index() + usize::from(guess)].fetch_add(1, Ordering::Relaxed);
-        }
-    });
-    let of = |of: &[AtomicU32]| largest::<D>(|axis| of[axis].load(Ordering::Relaxed) as f32);
-    votes.chunks_exact(D).map(of).collect()
 }
 
 /// Returns the axis with the largest value, the lowest of equal ones.

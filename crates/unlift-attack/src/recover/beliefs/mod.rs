@@ -26,7 +26,8 @@ use crate::geometry::knn::{Knn, LEAF};
 use crate::geometry::vector::widen;
 use crate::parallel;
 use crate::recover::map::{
-    Candidate, Family, Piece, Step, along_curve, distance2, evenly, known, ln, solve_slots, unit,
+    Candidate, Family, Piece, Step, along_curve, distance2, evenly, known, ln, solve_slots, sorted,
+    unit,
 };
 use crate::recover::problem::Problem;
 use crate::recover::result::{Estimate, Status};
@@ -245,8 +246,7 @@ fn marginals<const D: usize, F: Family<D>>(family: &F, n: usize) -> Vec<Vec<f32>
     }
     let of_axis = |axis: usize| {
         let values: Vec<f32> = (0..n).map(|slot| family.piece(slot, axis).through[axis]).collect();
-        let mut sorted = values.clone();
-        sorted.sort_unstable_by(f32::total_cmp);
+        let sorted = sorted(values.iter().copied());
         let around = (n / 200).max(20);
         let density = |value: &f32| {
             let at = sorted.partition_point(|x| x < value);
@@ -399,7 +399,8 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                 }
                 near.push(Near { x: y, weight, inverse_width: 1.0 / width, class, goes_on: true });
                 if candidates.len() - first < of_edges && d2 < NEAR2 * width * width {
-                    add(candidates, first, x, piece, APART * width);
+                    let new = Candidate { x, piece, score: 0.0 };
+                    Self::add(candidates, first, new, APART * width);
                 }
             }
             if let Some(last) = near[from..].last_mut() {
@@ -419,8 +420,18 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             if distance2(&x, y) < PROPOSAL_NEAR2[D - 2] * typical * typical
                 && !self.is_at_center(&own, &x)
             {
-                add(candidates, first, x, piece, APART * typical);
+                let new = Candidate { x, piece, score: 0.0 };
+                Self::add(candidates, first, new, APART * typical);
             }
+        }
+    }
+
+    /// Adds a candidate unless one of the same piece, from index `first` on, is close.
+    #[inline(always)]
+    fn add(candidates: &mut Vec<Candidate<D>>, first: usize, new: Candidate<D>, apart: f32) {
+        let is_close = |old: &Candidate<D>| (0..D).all(|c| (old.x[c] - new.x[c]).abs() < apart);
+        if !candidates[first..].iter().any(is_close) {
+            candidates.push(new);
         }
     }
 
@@ -534,20 +545,5 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
             }
         }
         kept
-    }
-}
-
-/// Adds a candidate unless one of the same piece, from index `first` on, is close.
-#[inline(always)]
-fn add<const D: usize>(
-    candidates: &mut Vec<Candidate<D>>,
-    first: usize,
-    x: [f32; D],
-    piece: usize,
-    apart: f32,
-) {
-    let is_close = |other: &Candidate<D>| (0..D).all(|c| (other.x[c] - x[c]).abs() < apart);
-    if !candidates[first..].iter().any(is_close) {
-        candidates.push(Candidate { x, piece, score: 0.0 });
     }
 }

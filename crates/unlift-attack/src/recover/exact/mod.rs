@@ -6,6 +6,7 @@
 mod partners;
 
 use crate::parallel;
+use crate::recover::map::sorted;
 use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
 use partners::{LOST, Partners, Side};
@@ -149,15 +150,10 @@ fn probability(messages: &[f32], partners: &Partners, weight: &[f32], e: usize) 
 /// Returns, per record, the inverse density of published values around its estimate: a rare value nearby is strong evidence.
 fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) -> Vec<f64> {
     let half = 0.5 * reach;
-    let sorted: [Vec<f32>; D] = std::array::from_fn(|axis| {
-        let mut values: Vec<f32> = published.iter().map(|p| p[axis]).collect();
-        values.sort_unstable_by(f32::total_cmp);
-        values
-    });
+    let columns: [Vec<f32>; D] =
+        std::array::from_fn(|axis| sorted(published.iter().map(|p| p[axis])));
     let of = |side: &Side| {
-        let Some(values) = sorted.get(side.axis) else {
-            return 0.0;
-        };
+        let Some(values) = columns.get(side.axis) else { return 0.0 };
         let from = values.partition_point(|&v| v < side.estimate - half);
         let to = values.partition_point(|&v| v <= side.estimate + half);
         2.0 * f64::from(half) * values.len() as f64 / (to - from + 1) as f64
@@ -166,8 +162,7 @@ fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) ->
 }
 
 fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
-    let mut sorted: Vec<f32> = estimates.iter().map(|e| e.evidence).collect();
-    sorted.sort_unstable_by(f32::total_cmp);
+    let sorted = sorted(estimates.iter().map(|e| e.evidence));
     let bounds: Vec<f32> =
         (1..CLASSES).filter_map(|c| sorted.get(c * sorted.len() / CLASSES).copied()).collect();
     estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence)).collect()
@@ -203,9 +198,10 @@ impl Distances {
     }
 
     fn tabulate(&mut self) {
-        let density = |class: usize, step: usize| -> f64 { self.parts(class, step).iter().sum() };
-        let of_class =
-            |class: usize| std::array::from_fn(|step| self.good[class] * density(class, step));
+        let of_class = |class: usize| {
+            let density = |step: usize| self.parts(class, step).iter().sum::<f64>();
+            std::array::from_fn(|step| self.good[class] * density(step))
+        };
         self.table = (0..CLASSES).map(of_class).collect();
     }
 

@@ -25,7 +25,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::parallel;
 use crate::recover::joint::neighbor_distribution::{Learning, REACH};
-use crate::recover::joint::update::{Context, TUBE};
+use crate::recover::joint::update::Context;
+use crate::recover::joint::votes::TUBE;
 use crate::recover::map::{
     Density, Family, along_curve, distance2, evenly, record_of, solve_slots,
 };

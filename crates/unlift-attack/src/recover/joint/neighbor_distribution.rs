@@ -63,32 +63,28 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
         let x = self.estimates[*slot].position;
         let reach = self.reach_at(&x);
         let (reach2, scale) = (reach * reach, BINS as f32 / reach);
-        let close = |edge: (usize, u8)| {
-            let d2 = nearest2(self.estimates, graph.slots_at(edge), &x);
-            (d2 < reach2).then(|| ((d2.sqrt() * scale) as usize).min(BINS - 1))
-        };
+        let Tally { bins, classes, random: random_edges } = tally;
+        let mut add =
+            |edge: (usize, u8), edges: &mut [f64; 2], weights: [f64; 2], column: usize| {
+                edges[0] += 1.0;
+                let d2 = nearest2(self.estimates, graph.slots_at(edge), &x);
+                if d2 < reach2 {
+                    edges[1] += 1.0;
+                    let bin = ((d2.sqrt() * scale) as usize).min(BINS - 1);
+                    bins.iter_mut().zip(weights).for_each(|(bins, n)| bins[bin][column] += n);
+                }
+            };
         let (n_edges, mut n_mutual) = (graph.of(*slot).len() as f64, 0.0);
         for edge in graph.of(*slot) {
             let is_mutual = f64::from(u8::from(side(edge.1) == Side::Mutual));
             n_mutual += is_mutual;
-            let of_class = &mut tally.classes[usize::from(edge.1)];
-            of_class[0] += 1.0;
-            if let Some(bin) = close(edge) {
-                tally.bins[0][bin][0] += 1.0;
-                tally.bins[1][bin][0] += is_mutual;
-                of_class[1] += 1.0;
-            }
+            add(edge, &mut classes[usize::from(edge.1)], [1.0, is_mutual], 0);
         }
         // The random edges get the total weight of the slot's own edges.
         let per_random = [n_edges, n_mutual].map(|n| n / RANDOM as f64);
         for &edge in random {
-            let of_kind = &mut tally.random[usize::from(graph.is_either(edge.1))];
-            of_kind[0] += 1.0;
-            if let Some(bin) = close(edge) {
-                tally.bins[0][bin][1] += per_random[0];
-                tally.bins[1][bin][1] += per_random[1];
-                of_kind[1] += 1.0;
-            }
+            let leads_to_either = usize::from(graph.is_either(edge.1));
+            add(edge, &mut random_edges[leads_to_either], per_random, 1);
         }
     }
 
@@ -120,6 +116,7 @@ impl<const D: usize, F: Family<D>> Learning<'_, D, F> {
             _ => (1.0, std::f32::consts::PI * std::f32::consts::PI / 4.0),
         };
         let a = radius / median;
+        let close_fraction = |[edges, close]: [f64; 2]| close / f64::max(edges, 1.0);
         let chance = tally.random.map(close_fraction);
         let mut odds = [0.0; CLASSES];
         let (mut ends, mut neighbors) = (0.0, 0.0);
@@ -227,10 +224,6 @@ impl Tally {
         let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
         std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0))
     }
-}
-
-fn close_fraction([edges, close]: [f64; 2]) -> f64 {
-    close / edges.max(1.0)
 }
 
 /// Returns the distance that splits `excess` in half, as a fraction of the reach.

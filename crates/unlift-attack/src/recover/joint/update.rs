@@ -9,10 +9,6 @@ use crate::recover::map::{
 use crate::recover::problem::Problem;
 use crate::recover::result::Estimate;
 
-/// Estimates farther from a piece than this many radii are ignored.
-pub(super) const TUBE: f32 = 6.0;
-/// Estimates within this many radii of the center of a ray are ignored: they are close to all its rays, so that a few draw many slots.
-const CENTER_RADIUS: f32 = 3.0;
 /// Candidates per piece are chosen so that about this many are estimates of true neighbors.
 const TRUE_CANDIDATES: f32 = 5.0;
 /// Bounds of that number; up to half as many are taken, evenly spaced among all.
@@ -53,12 +49,10 @@ impl<const D: usize, F: Family<D>> Step for Context<'_, D, F> {
         scratch.candidates.clear();
         scratch.near.resize_with(F::PIECES, Near::default);
         scratch.all.gather(graph, slot, self.estimates);
-        let (reach, center_radius) =
-            (TUBE * self.neighbors.radius, CENTER_RADIUS * self.neighbors.radius);
-        let odds = self.odds(slot);
+        let (odds, radius) = (self.odds(slot), self.neighbors.radius);
         for piece in 0..F::PIECES {
             let own = family.piece(slot, piece);
-            scratch.all.near(&own, reach, center_radius, &odds, &mut scratch.near[piece]);
+            scratch.all.near(&own, radius, &odds, &mut scratch.near[piece]);
             self.propose(&own, (slot, piece), scratch);
         }
         let Some((first, margin)) = self.winner(slot, &scratch.candidates) else {
@@ -196,14 +190,6 @@ struct Sums<const D: usize> {
 }
 
 impl<const D: usize> Sums<D> {
-    const ZERO: Self = Self {
-        n: [0; LANES],
-        weight: [0.0; LANES],
-        pull: [[0.0; LANES]; D],
-        free_pull: [[0.0; LANES]; D],
-        free: [[[0.0; LANES]; D]; D],
-    };
-
     /// Sums over the neighbors of `near` within `1 / sqrt(inverse_reach2)` of `x`.
     #[inline(always)]
     fn new(
@@ -212,7 +198,8 @@ impl<const D: usize> Sums<D> {
         x: &[f32; D],
         (inverse_reach2, (gain, inverse_a2), half_weight_ratio): (f32, (f32, f32), f32),
     ) -> Self {
-        let mut sums = Self::ZERO;
+        let (weight, pull) = ([0.0; LANES], [[0.0; LANES]; D]);
+        let mut sums = Self { n: [0; LANES], weight, pull, free_pull: pull, free: [pull; D] };
         let odds = near.odds.as_chunks::<LANES>().0;
         let places: [&[Lanes]; D] =
             std::array::from_fn(|c| &near.x.0[c].as_chunks().0[..odds.len()]);
@@ -279,59 +266,55 @@ impl<const D: usize, F: Family<D>> Context<'_, D, F> {
                     _ => near.n_pairs(&x, inverse_reach2),
                 };
             }
-            x = own.project(&step::<D, F>(own, &x, &sums, n));
+            x = own.project(&Self::step(own, &x, &sums, n));
         }
         (x, records)
     }
-}
 
-/// Returns `x` plus the least-squares step along `own`, from the sums over `n` neighbors.
-#[inline(always)]
-fn step<const D: usize, F: Family<D>>(
-    own: &Piece<D>,
-    x: &[f32; D],
-    sums: &Sums<D>,
-    n: u32,
-) -> [f32; D] {
-    let total = |lanes: &Lanes| lanes.iter().sum::<f32>();
-    let weight = total(&sums.weight);
-    let mut pull = sums.pull.map(|lanes| total(&lanes));
-    // The component along a record: the direction of a line, or all but the normal of a plane.
-    let (whole, sign) = if F::IS_PLANE { (1.0, -1.0) } else { (0.0, 1.0) };
-    let free_fraction = 1.0 - F::MOST_ALONG.min(F::ALONG / n.max(1) as f32);
-    let mut hold = [[0.0f32; D]; D];
-    for (r, row) in hold.iter_mut().enumerate() {
-        for (c, value) in row.iter_mut().enumerate() {
-            let free = sign * total(&sums.free[r.min(c)][r.max(c)]);
-            *value = -free_fraction * if r == c { free + whole * weight } else { free };
-        }
-        row[r] += weight;
-        pull[r] -= free_fraction * (whole * pull[r] + sign * total(&sums.free_pull[r]));
-    }
-    // The step solves `hold step = pull` within the piece: P hold P + weight (1 - P). The component across is decoupled and stays 0.
-    let p = &own.along;
-    let (mut half, mut full, mut right) = ([[0.0f32; D]; D], [[0.0f32; D]; D], [0.0f32; D]);
-    for r in 0..D {
-        for c in 0..D {
-            for k in 0..D {
-                half[r][c] += p[r][k] * hold[k][c];
+    /// Returns `x` plus the least-squares step along `own`, from the sums over `n` neighbors.
+    #[inline(always)]
+    fn step(own: &Piece<D>, x: &[f32; D], sums: &Sums<D>, n: u32) -> [f32; D] {
+        let total = |lanes: &Lanes| lanes.iter().sum::<f32>();
+        let weight = total(&sums.weight);
+        let mut pull = sums.pull.map(|lanes| total(&lanes));
+        // The component along a record: the direction of a line, or all but the normal of a plane.
+        let (whole, sign) = if F::IS_PLANE { (1.0, -1.0) } else { (0.0, 1.0) };
+        let free_fraction = 1.0 - F::MOST_ALONG.min(F::ALONG / n.max(1) as f32);
+        let mut hold = [[0.0f32; D]; D];
+        for (r, row) in hold.iter_mut().enumerate() {
+            for (c, value) in row.iter_mut().enumerate() {
+                let free = sign * total(&sums.free[r.min(c)][r.max(c)]);
+                *value = -free_fraction * if r == c { free + whole * weight } else { free };
             }
-            right[r] += p[r][c] * pull[c];
+            row[r] += weight;
+            pull[r] -= free_fraction * (whole * pull[r] + sign * total(&sums.free_pull[r]));
         }
-    }
-    for r in 0..D {
-        for c in 0..D {
-            for k in 0..D {
-                full[r][c] += half[r][k] * p[k][c];
+        // The step solves `hold step = pull` within the piece: P hold P + weight (1 - P). The component across is decoupled
+        // and stays 0.
+        let p = &own.along;
+        let (mut half, mut full, mut right) = ([[0.0f32; D]; D], [[0.0f32; D]; D], [0.0f32; D]);
+        for r in 0..D {
+            for c in 0..D {
+                for k in 0..D {
+                    half[r][c] += p[r][k] * hold[k][c];
+                }
+                right[r] += p[r][c] * pull[c];
             }
-            full[r][c] -= weight * p[r][c];
         }
-        full[r][r] += weight;
+        for r in 0..D {
+            for c in 0..D {
+                for k in 0..D {
+                    full[r][c] += half[r][k] * p[k][c];
+                }
+                full[r][c] -= weight * p[r][c];
+            }
+            full[r][r] += weight;
+        }
+        if !solve_symmetric(&mut full, &mut right) {
+            return *x;
+        }
+        std::array::from_fn(|c| x[c] + right[c])
     }
-    if !solve_symmetric(&mut full, &mut right) {
-        return *x;
-    }
-    std::array::from_fn(|c| x[c] + right[c])
 }
 
 /// Solves `a x = b` for a symmetric positive definite `a`; `b` becomes `x`. Returns `false` if `a` is singular.

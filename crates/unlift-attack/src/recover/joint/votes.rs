@@ -8,6 +8,11 @@ use crate::recover::result::Estimate;
 /// Coordinate of padding: beyond any reach, and finite when squared.
 const PADDING_COORDINATE: f32 = 1e19;
 
+/// Estimates farther from a piece than this many radii are ignored.
+pub(super) const TUBE: f32 = 6.0;
+/// Estimates within this many radii of the center of a ray are ignored: they are close to all its rays, so that a few draw many slots.
+const CENTER_RADIUS: f32 = 3.0;
+
 /// Odds that the edges of a slot lead to true neighbors of this slot.
 pub(super) struct Odds<'a, const D: usize> {
     pub(super) of_class: &'a [f32; CLASSES],
@@ -65,16 +70,16 @@ impl<const D: usize> Ends<D> {
         self.slot.len()
     }
 
-    /// Copies the estimates within `reach` of `piece` to `near`, except those within `center_radius` of the center of a ray.
+    /// Copies the estimates near `piece` to `near`, except those at the center of a ray. `radius` is that of true neighbors.
     #[inline(always)]
     pub(super) fn near(
         &mut self,
         piece: &Piece<D>,
-        reach: f32,
-        center_radius: f32,
+        radius: f32,
         odds: &Odds<'_, D>,
         near: &mut Near<D>,
     ) {
+        let (reach, center_radius) = (TUBE * radius, CENTER_RADIUS * radius);
         let n = self.slot.len();
         self.apart2.resize(n, 0.0);
         let columns = self.x.first(n);

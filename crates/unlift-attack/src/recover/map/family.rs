@@ -10,7 +10,7 @@ use crate::recover::map::chance::{
 use crate::recover::map::graph::record_of;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE, Scratch, evidence, ln, rows_of};
-use crate::recover::map::places::{distance2, evenly, trimmed_box, unit};
+use crate::recover::map::places::{distance2, evenly, sorted, trimmed_box, unit};
 use crate::recover::result::{Estimate, Status};
 use crate::released::{AxisPlanes, Released};
 use crate::simd::prefetch;
@@ -236,9 +236,7 @@ impl<const D: usize> Family<D> for LineFamily<D> {
     ) -> Estimate<D> {
         let Scratch { lines, sections, intervals, .. } = scratch;
         let (own, delta2) = (self.own(slot), delta * delta);
-        lines.gather(&self.rows, listed);
-        lines.sections(own, sections);
-        let may_vote = lines.n_that_may_vote(own);
+        let may_vote = lines.sections(&self.rows, listed, own, sections);
         if sections.n_voting() < 2 {
             return Estimate::lost(Status::not_fixed(may_vote));
         }
@@ -527,11 +525,8 @@ impl<const D: usize> Family<D> for CandidateFamily<'_, D> {
 
     /// The largest interquartile range over the axes.
     fn extent(&self) -> f64 {
-        let range = |axis: usize| {
-            let mut column: Vec<f32> = self.rows.iter().map(|row| row[axis]).collect();
-            column.sort_unstable_by(f32::total_cmp);
-            interquartile_range(&column)
-        };
+        let column = |axis: usize| sorted(self.rows.iter().map(|row| row[axis]));
+        let range = |axis: usize| interquartile_range(&column(axis));
         (0..D).map(range).fold(0.0, f64::max)
     }
 

@@ -3,7 +3,7 @@
 use crate::parallel;
 use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::LineRow;
-use crate::recover::map::places::{sample, trimmed_box};
+use crate::recover::map::places::{sample, sorted, trimmed_box};
 use crate::recover::result::Estimate;
 
 /// Cubic cells over a box. Places outside belong to the nearest cell.
@@ -216,8 +216,7 @@ impl<const D: usize> Density<D> {
         for value in &mut grid.values {
             *value = value.max(least) * scale;
         }
-        let mut densities: Vec<f32> = places.iter().map(|x| grid.at(x)).collect();
-        densities.sort_unstable_by(f32::total_cmp);
+        let densities = sorted(places.iter().map(|x| grid.at(x)));
         let typical = densities.get(densities.len() / 2).copied().unwrap_or(scale);
         Self { grid, typical }
     }

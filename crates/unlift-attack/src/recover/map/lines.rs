@@ -180,23 +180,19 @@ pub(crate) struct LineColumns<const D: usize> {
 }
 
 impl<const D: usize> LineColumns<D> {
+    /// Computes the sections of the rows of `records` with `own`. Returns how many of them may vote, see [`LineRow::may_vote_for`].
     #[inline(always)]
-    pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
+    pub(crate) fn sections(
+        &mut self,
+        rows: &[LineRow<D>],
+        records: &[RecordId],
+        own: &LineRow<D>,
+        out: &mut Sections,
+    ) -> usize {
         self.through.fill(records, |record| rows[record.index()].through);
         self.direction.fill(records, |record| rows[record.index()].direction);
         self.group.clear();
         self.group.extend(records.iter().map(|record| rows[record.index()].group));
-    }
-
-    /// Returns how many gathered records are evidence for a point on `own`, see [`LineRow::may_vote_for`].
-    #[inline(always)]
-    pub(crate) fn n_that_may_vote(&self, own: &LineRow<D>) -> usize {
-        self.group.iter().filter(|&&group| !own.is_ray() || group != own.group).count()
-    }
-
-    /// Computes the sections of the gathered records with `own`.
-    #[inline(always)]
-    pub(crate) fn sections(&self, own: &LineRow<D>, out: &mut Sections) {
         let n = self.group.len();
         out.resize(n);
         let (through, direction) = (self.through.first(n), self.direction.first(n));
@@ -208,6 +204,7 @@ impl<const D: usize> LineColumns<D> {
             let row = LineRow { through, direction, group: group[j], to: f32::INFINITY };
             (at[j], miss2[j], bend[j]) = own.section(&row);
         }
+        group.iter().filter(|&&group| !own.is_ray() || group != own.group).count()
     }
 }
 

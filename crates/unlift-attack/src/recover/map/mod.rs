@@ -19,5 +19,5 @@ pub(crate) use lines::{
 };
 pub(crate) use places::{
     CHUNK, Candidate, Step, along_curve, distance2, evenly, known, nearest2, rows_mut, solve_slots,
-    trimmed_box, unit,
+    sorted, trimmed_box, unit,
 };

@@ -109,6 +109,13 @@ pub(crate) fn rows_mut<'a>(mut column: &'a mut [f32], offsets: &[usize]) -> Vec<
     offsets.windows(2).map(row).collect()
 }
 
+/// Returns the values in ascending order.
+pub(crate) fn sorted(values: impl Iterator<Item = f32>) -> Vec<f32> {
+    let mut sorted: Vec<f32> = values.collect();
+    sorted.sort_unstable_by(f32::total_cmp);
+    sorted
+}
+
 #[inline(always)]
 pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     let mut sum = 0.0;
