@@ -370,7 +370,7 @@ mod tests {
         let data = encode(&scene, &[row(0)], 0.1, &mut Blocks::default()).expect("a view");
         let view = &data["views"][0];
         assert_eq!(view["drawn"], 6);
-        assert_eq!(view["said"], "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
+        assert_eq!(view["said"], "6 of 9 points drawn; 1 not released, 1 lost, 1 far outside");
     }
 
     #[test]
