@@ -430,7 +430,7 @@ impl Comparison {
         let points = self.tolerance_points;
         let not = if self.is_like() { "" } else { "not like for like: " };
         let mut text = format!(
-            "{not}{} figures compared, tolerance in points {points} (twice the spread of a figure, if more): {more} leak more, {less} less, {same} as before",
+            "{not}{} figures compared, tolerance {points} points or twice a figure's own spread: {more} leak more, {less} less, {same} as before",
             more + less + same
         );
         for (n, what) in [

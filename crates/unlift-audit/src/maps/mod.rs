@@ -235,7 +235,7 @@ pub fn prepare<'a>(
         rows.truncate(max_points);
         rows.sort_unstable();
     }
-    if preparation.even && rows.len() % 2 == 1 {
+    if preparation.even && rows.len() % 2 == 1 && rows.len() > preparation.k + 1 {
         rows.pop();
         remarks.notes.push("1 point is left out, so that schemes that pair points hide the same ones as all others".to_owned());
     }
@@ -357,6 +357,8 @@ mod tests {
             assert_eq!(points.positions()[3], [third, 0.0, 0.0]);
             let even = prepare(line(9), None, &Preparation { scale, even: true, ..PLAIN }).unwrap();
             assert_eq!((even.rows, even.remarks.notes.len()), ((0..8).collect(), 1));
+            let few = prepare(line(3), None, &Preparation { scale, even: true, ..PLAIN }).unwrap();
+            assert_eq!(few.rows.len(), 3, "no fewer than K + 1");
         }
         let coincide = "median distance to neighbor 2: expected more than 0 (points that do not coincide), found 0";
         for (points, expected) in [

@@ -57,8 +57,8 @@ fn what_leaks_more_or_is_out_of_view_fails() {
         change(&mut document);
         place.write(name, document.to_string());
     }
-    let usual = "tolerance in points 2 (twice the spread of a figure, if more): ";
-    let spread = "tolerance in points 1.21 (twice the spread of a figure, if more): ";
+    let usual = "tolerance 2 points or twice a figure's own spread: ";
+    let spread = "tolerance 1.21 points or twice a figure's own spread: ";
     for (files, code, tolerance, expected) in [
         ("was.json was.json", 0, usual, "0 leak more, 0 less, 20 as before\n"),
         ("old.json new.json", 1, usual, "1 leak more, 0 less, 19 as before\n"),

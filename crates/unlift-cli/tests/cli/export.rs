@@ -43,8 +43,10 @@ fn points_come_back_on_the_map_and_what_is_not_ours_stays() {
     place.write("mine.ply", "mine");
     place.write("mine/points3D.txt", "# mine");
     let n_entries = || [place.n_entries(""), place.n_entries("mine")];
+    place.ends("obfuscate room.csv --k 10 --seed 1 --schemes cp --out unscaled", 0);
     let before = n_entries();
     place.refuses("export", &[
+        ("unscaled/truth.npz --cameras project --out new", 2, "--cameras: expected a file in meters"),
         ("hidden/released.npz --out lines.ply", 3, "found lines, rays or planes"),
         ("lists.npz --out lists.ply", 3, "found neighborhoods"),
         ("back.npz --cameras room.csv --out new", 3, "expected a COLMAP model with cameras"),

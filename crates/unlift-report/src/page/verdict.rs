@@ -460,10 +460,10 @@ pub(crate) fn is_decided(results: &Results<'_>, scheme: Option<&str>) -> bool {
                 && !results.is_again()
         }
     };
-    // A doubt about another scheme begins with its name.
+    // A doubt about another scheme begins with its name. A user's scheme may be called as other doubts begin.
     let of_others = |doubt: &String| {
-        let mut others = results.schemes.iter().filter(|name| Some(**name) != scheme);
-        scheme.is_some() && others.any(|name| doubt.starts_with(&format!("{name}: ")))
+        let of = doubt.split_once(": ").map_or("", |(of, _)| of);
+        scheme.is_some_and(|name| name != of) && words::facts(of).is_some()
     };
     is_best && results.document.doubts.iter().all(of_others)
 }

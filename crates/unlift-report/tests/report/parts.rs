@@ -1,7 +1,7 @@
 //! Tests of what some audits have besides the verdict: the cost of protection, and painted pictures.
 
 use unlift_report::compare::{Accepted, compare};
-use unlift_report::document::{Document, GateResult, HeldOut, Localization, Row};
+use unlift_report::document::{Document, GateResult, HeldOut, Localization, Row, Spread};
 use unlift_report::inversions::{Inversion, Painted};
 use unlift_report::{ByAttack, RenderOptions, gate_lines, junit, render, text_table};
 
@@ -58,6 +58,16 @@ fn the_cost_of_protection_has_a_sentence_a_chart_and_a_table() {
         "the query",
     ] {
         assert!(some.contains(said), "{said}");
+    }
+    // A doubt leaves schemes decided only if it is about another scheme.
+    for (doubt, decided) in [("ppl: noise", true), ("olc: noise", false), ("unit: 2", false)] {
+        let mut document = document(true);
+        document.doubts = vec![doubt.to_owned()];
+        assert_eq!(
+            page(&document, None, false).contains("olc keeps the attacks"),
+            decided,
+            "{doubt}"
+        );
     }
     let text = text_table(&document(true));
     assert!(text.contains("does not localize") && text.contains("1.4x"), "{text}");
@@ -154,6 +164,22 @@ fn a_new_doubt_fails_a_comparison_whatever_is_accepted() {
     // What queries cost has no rows of its own.
     new.localization.iter_mut().filter(|of| of.of_queries).for_each(|of| of.multiple = Some(14.0));
     assert!(!compare(&old, &new, None).unwrap().passed);
+}
+
+#[test]
+fn a_figure_that_varies_much_lets_no_other_rise() {
+    let old = document(true);
+    for (varies, passes) in [("olc", true), ("ppl", false)] {
+        let mut new = old.clone();
+        sample::change(&mut new, varies, |row| {
+            let spread = row.recovered_percent.keys().map(|label| (label.clone(), 5.3)).collect();
+            row.std = Some(Spread { recovered_percent: spread, ..Spread::default() });
+        });
+        sample::change(&mut new, "olc", |row| {
+            row.recovered_percent.values_mut().for_each(|percent| *percent += 4.0);
+        });
+        assert_eq!(compare(&old, &new, None).unwrap().passed, passes, "{varies}");
+    }
 }
 
 #[test]
